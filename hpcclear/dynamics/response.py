@@ -48,7 +48,7 @@ from hpcclear.results.content import Results
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
-from hpcclear.scene.scene import has_pressure, record_of
+from hpcclear.scene.scene import record_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,7 +170,7 @@ def _response(
     record = asked(record, objective)
     record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
-    names = [*_REPORTED, *(WIDEST if has_pressure(scene) and not still else ())]
+    names = [*_REPORTED, *(WIDEST if scene.effects.has_pressure and not still else ())]
     names += [] if steady is None else [*STEADY, "regime"]
     if steady is None and not still:  # what the sample measures as well has its bits
         names += [name for name in impacts_reported(problem_of(scene)) if name in data]

@@ -16,10 +16,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import model_validator
 
-from hpcclear.base.errors import at, nearest
-from hpcclear.scene.fields import Number, Quantity, Table, invalid
+from hpcclear.base.errors import nearest
+from hpcclear.scene.fields import Number, Quantity, Table, check_known, invalid
 from hpcclear.scene.fits import fit_of
-from hpcclear.scene.paths import quantities
+from hpcclear.scene.paths import flatten, quantities
 
 MOST = 1000
 """Values of a variable at most."""
@@ -51,7 +51,7 @@ class CatalogueRow(Table):
             return data
         kept = {key: data[key] for key in ("name", "cost") if key in data}
         rest = {key: value for key, value in data.items() if key not in kept}
-        entries = dict(_flat(rest))
+        entries = dict(flatten(rest))  # quoted, or as nested tables
         for path, value in entries.items():
             if path.startswith(OF_RANDOM):
                 input_entry(path)
@@ -59,32 +59,17 @@ class CatalogueRow(Table):
             if path not in quantities():
                 remedy = nearest(path, tuple(quantities()))
                 raise invalid("is not a physical number of a scene", remedy, path, value)
-            with at(path, value):
-                entries[path] = quantities()[path].convert(value)
+            entries[path] = quantities()[path].convert(value, path)
         if not entries:
             raise invalid("has no entry", 'Write "joints.crank_rod.clearance" = "20 um", say')
         return {**kept, "entries": entries}
-
-
-def _flat(table: Mapping[str, object], prefix: str = "") -> list[tuple[str, object]]:
-    """Dotted keys, whether the file has them quoted or as nested tables."""
-    found = []
-    for key, value in table.items():
-        path = f"{prefix}{key}"
-        found += _flat(value, f"{path}.") if isinstance(value, Mapping) else [(path, value)]
-    return found
 
 
 def input_entry(path: str) -> tuple[str, str]:
     """Name and entry of the random input of a path such as "random.C12.half_width"; an error for validators if it is none."""
     _, _, rest = path.partition(".")
     name, _, entry = rest.partition(".")
-    if entry not in OF_INPUT:
-        raise invalid(
-            f"{path!r} is no entry of a random input that a variable may drive",
-            nearest(entry, tuple(OF_INPUT)),
-            "path",
-        )
+    check_known(entry, OF_INPUT, "is no entry of a random input that a variable may drive", "path")
     return name, entry
 
 
@@ -158,8 +143,7 @@ class Cost(Table):
         made = dict(given)
         for key in ("at", "scale"):
             if key in made:
-                with at(f"cost.{key}", made[key]):
-                    made[key] = Quantity(unit, above=0).convert(made[key])
+                made[key] = Quantity(unit, above=0).convert(made[key], f"cost.{key}")
         return made
 
     def _check(self) -> None:
@@ -192,11 +176,7 @@ class Cost(Table):
 
 
 def _converted(given: Sequence[object]) -> list[float]:
-    found = []
-    for k, one in enumerate(given):
-        with at(f"cost.{k}", one):
-            found.append(Quantity("").convert(one))
-    return found
+    return [Quantity("").convert(one, f"cost.{k}") for k, one in enumerate(given)]
 
 
 def _by_grades(given: Mapping[str, object], fits: Sequence[object]) -> list[float]:

@@ -14,7 +14,6 @@ from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.joints import Guide, length_path
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import check_scene
 from hpcclear.scene.tables import SceneTables
 
 
@@ -71,7 +70,6 @@ class ConsistentTables(SceneTables):
     def _check(self) -> None:
         self._check_mechanism()
         self._check_effects()
-        check_scene(self, self.bending())
         self._check_profiles()
         self._check_objective()
         self._check_target()
@@ -150,14 +148,18 @@ class ConsistentTables(SceneTables):
             )
 
     def _check_profiles(self) -> None:
-        oiled = [name for name in self.worn_joints() if name in self.films()]
-        if self.wear is not None and self.wear.waves and oiled:
-            raise invalid(
-                f"joint {oiled[0]} has an oil film, which needs round surfaces",
-                'Set it to "uniform", or remove the film',
-                key="wear.profile",
-                value=self.wear.profile,
-            )
+        """An angular profile needs dry joints of rigid bodies."""
+        if self.wear is None or not self.wear.waves or not self.worn_joints():
+            return
+        own = "wear.profile", self.wear.profile
+        if self.bending():
+            remedy = 'Set it to "uniform", or leave bending out'
+            reason = "an angular wear profile needs rigid bodies, but a body bends"
+            raise invalid(reason, remedy, *own)
+        for name in self.worn_joints():
+            if name in self.films():
+                reason = f"joint {name} has an oil film, which needs round surfaces"
+                raise invalid(reason, 'Set it to "uniform", or remove the film', *own)
 
     def _check_objective(self) -> None:
         chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
@@ -195,11 +197,7 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
 
     def _check_pressures(self) -> None:
-        table: Any = self.effects.contact
-        geometry = None if table is None else table.declared.geometry
-        if geometry is not None and geometry.pressure is not None:
-            return
-        for one in self._objectives():
+        for one in () if self.effects.has_pressure else self._objectives():
             if not one.asks.isdisjoint(WIDEST):
                 raise invalid(
                     f"{one.name} needs a geometry of contact with a pressure",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pydantic import GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from hpcclear.base.pieces import Rows
@@ -72,7 +73,7 @@ class Pairs(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> JsonSchemaValue:
         number, text = {"type": "number"}, {"type": "string"}
         pair = {"type": "array", "items": {"anyOf": [number, text]}, "minItems": 2, "maxItems": 2}
         table = {"type": "array", "items": pair, "minItems": self.fewest, "maxItems": self.most}

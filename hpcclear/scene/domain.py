@@ -169,5 +169,4 @@ def slender_inertias(
         values[:, columns[path]] if path in columns else scene.number(path)
         for path in (f"{link}.mass", f"{link}.length")
     )
-    found: Array | float = slender_inertia(mass, length)
-    return found
+    return slender_inertia(mass, length)

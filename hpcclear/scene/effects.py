@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 from pydantic import field_validator, model_validator
 
 from hpcclear.base.pieces import Rows
+from hpcclear.laws.declared import ContactLaw, FrictionLaw
 from hpcclear.scene.curves import Curve, Pairs, by_angle
 from hpcclear.scene.fields import Quantity, Speed, Table, invalid
 from hpcclear.scene.joints import JointFriction
@@ -37,6 +38,12 @@ class ContactTable(LawTable):
     def _sphere_is_the_default(cls, name: str | None) -> str | None:
         return None if name == SPHERE else name
 
+    @property
+    def declared(self) -> ContactLaw:
+        """The law."""
+        assert isinstance(self._law, ContactLaw)
+        return self._law
+
     def _check(self) -> None:
         if self.curve is not None and self.geometry is None:
             raise invalid('belongs to geometry = "table"', "Write geometry, or remove it", "curve")
@@ -44,13 +51,13 @@ class ContactTable(LawTable):
     @property
     def has_length(self) -> bool:
         """Whether the length of each bearing is needed."""
-        shapes = getattr(self.declared, "geometry", None)
-        return shapes is not None and bool(shapes.has_length)
+        shape = self.declared.geometry
+        return shape is not None and shape.has_length
 
     @property
     def latched(self) -> bool:
         """Whether the law remembers the approach speed of each impact."""
-        return bool(self.declared.latched)
+        return self.declared.latched
 
 
 class FrictionTable(LawTable):
@@ -64,6 +71,12 @@ class FrictionTable(LawTable):
     """For the law "expression": friction / normal force as a function of the sliding speed v and parameters."""
     units: dict[str, str] | None = None
     """For the law "expression": units of its parameters. The parameters are further entries of this table."""
+
+    @property
+    def declared(self) -> FrictionLaw:
+        """The law."""
+        assert isinstance(self._law, FrictionLaw)
+        return self._law
 
     @property
     def bristled(self) -> bool:
@@ -85,6 +98,12 @@ class EffectTables(Table):
     revolution; default "none"."""
     guide_friction: JointFriction | None = None
     """Friction of the slider in its guide; default "none"."""
+
+    @property
+    def has_pressure(self) -> bool:
+        """Whether the geometry of contacts has a pressure."""
+        shape = None if self.contact is None else self.contact.declared.geometry
+        return shape is not None and shape.pressure is not None
 
     def law_unit(self, path: str) -> str | None:
         """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""

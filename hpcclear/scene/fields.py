@@ -14,6 +14,7 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from hpcclear.base.errors import InputError, at
@@ -84,13 +85,14 @@ def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
         raise invalid("is given twice or not at all", remedy, key=key, value=value)
 
 
-def check_table(data: object) -> None:
-    """Raise an error for validators unless this is a table whose keys are strings."""
+def checked_table(data: object) -> Mapping[str, object]:
+    """A table whose keys are strings; an error for validators where it is none."""
     if not isinstance(data, Mapping):
         raise invalid("a table is expected here", "Write it as [table] or { key = value }")
     for key in data:
         if not isinstance(key, str):
             raise invalid("keys are strings", "Write the key as text", key=repr(key))
+    return data
 
 
 class Table(BaseModel):
@@ -103,12 +105,9 @@ class Table(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> object:
-        if isinstance(data, Table):
-            return data
-        check_table(data)
+    def _known_keys(cls, data: object) -> object:
         known = tuple(cls.model_fields)
-        for key in data:
+        for key in () if isinstance(data, Table) else checked_table(data):
             if key not in known:
                 unknown = "is not a known key", hint(key) + nearest(key, known)
                 reason, remedy = cls.elsewhere.get(key, unknown)
@@ -244,8 +243,8 @@ class Quantity(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        number: dict[str, object] = {"type": "number"}
+    ) -> JsonSchemaValue:
+        number: JsonSchemaValue = {"type": "number"}
         for name, bound in (
             ("exclusiveMinimum", self.above),
             ("exclusiveMaximum", self.below),
@@ -283,7 +282,7 @@ class Count(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> JsonSchemaValue:
         return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
@@ -321,11 +320,11 @@ class NamedRows:
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> JsonSchemaValue:
         return {"type": "object", "additionalProperties": handler(schema)["items"]}
 
 
-NUMBER: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+NUMBER: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string"}]}
 _LIST = {"type": "array", "items": NUMBER, "minItems": 2}
 Number = Annotated[float | None, WithJsonSchema(NUMBER)]
 """A number that its table converts to SI, because its unit depends on other entries."""

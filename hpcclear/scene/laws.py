@@ -7,24 +7,23 @@ from functools import cache
 from typing import Any, ClassVar
 
 from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import at
+from hpcclear.base.pieces import Rows
 from hpcclear.laws import laws, names
+from hpcclear.laws.declared import ContactLaw, FrictionLaw, Geometry, Law, Parameter
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.curves import Pairs
-from hpcclear.scene.fields import Converted, Quantity, Table, check_table, hint, invalid, nearest
+from hpcclear.scene.fields import Converted, Quantity, Table, checked_table, hint, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
 
 SPHERE = "sphere"
 """The geometry of contact that laws of this package have by themselves."""
 
-
-@cache
-def named(law: object, name: str) -> Any:
-    """A user's law with the name that the scene has for it."""
-    return dataclasses.replace(law, name=name) if dataclasses.is_dataclass(law) else law  # type: ignore[type-var]
-
+REGISTRIES = {"contact": (CONTACT_LAWS, ContactLaw), "friction": (FRICTION_LAWS, FrictionLaw)}
+"""Where laws of users are found, by kind, and what they are."""
 
 PATTERN = r"^(expression|[A-Za-z_]\w*:[A-Za-z_]\w*)$"
 """Laws that are not ours."""
@@ -47,16 +46,16 @@ class LawName(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> JsonSchemaValue:
         return {"type": "string", "enum": [*names(self.kind)]}
 
 
 @cache
-def _on(law: Any, geometry: Any) -> Any:
+def _on(law: ContactLaw, geometry: Geometry) -> ContactLaw:
     return law.on(geometry)
 
 
-def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
+def on_geometry(law: ContactLaw, name: str, rows: Rows | None = None) -> ContactLaw:
     """A law on the elastic part of a geometry of that name, made of `rows` if it has a table; an error for validators where
     there is none."""
     found = laws("geometry")
@@ -78,32 +77,39 @@ def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
     return _on(law, shape if rows is None else shape.of_rows(rows))
 
 
-def _with_entries(kind: str) -> Iterator[Any]:
+def _with_entries(kind: str) -> Iterator[Law | Geometry]:
     """All of this package that has entries in a law's table: laws, and for contact the geometries."""
     yield from laws(kind).values()
     if kind == "contact":
         yield from laws("geometry").values()
 
 
-def known_laws(kind: str) -> dict[str, Any]:
+def known_laws(kind: str) -> dict[str, Law]:
     """Our laws and those of installed packages, by name; geometries and films are ours alone."""
     if kind in ("geometry", "film"):
         return dict(laws(kind))
-    registry = CONTACT_LAWS if kind == "contact" else FRICTION_LAWS
-    others = {name: named(registry.get(name), name) for name in registry.names()}
-    return {**laws(kind), **others}
+    return {**laws(kind), **{name: _of_user(kind, name) for name in REGISTRIES[kind][0].names()}}
 
 
-def quantity_of(parameter: Any) -> Quantity:
+@cache
+def _named(law: Law, name: str) -> Law:
+    return dataclasses.replace(law, name=name)
+
+
+def _of_user(kind: str, name: str) -> Law:
+    """A law from elsewhere with the name that the scene has for it; an error for validators where there is none."""
+    registry, made = REGISTRIES[kind]
+    with as_invalid("law"):
+        found = registry.get(name)
+    if not isinstance(found, made):
+        remedy = f"Make it a hpcclear.{made.__name__}, see docs/extending.md"
+        raise invalid(f"is no {kind} law", remedy, "law")
+    return _named(found, name)
+
+
+def quantity_of(p: Parameter) -> Quantity:
     """Of a law's parameter."""
-    p = parameter
     return Quantity(p.unit, above=p.above, below=p.below, least=p.least, most=p.most)
-
-
-def _declare(kind: str, parameter: Any) -> None:
-    """Make an entry of a user's law known by its path."""
-    quantity = quantity_of(parameter)
-    ENTRIES.setdefault(f"effects.{kind}.{parameter.name}", {})[quantity.unit] = quantity
 
 
 def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
@@ -123,7 +129,7 @@ class LawTable(Table):
     formula: ClassVar[str] = ""
     """The entry of a law that is an expression."""
     law: str
-    _law: Any = PrivateAttr(None)
+    _law: Law | None = PrivateAttr(None)
 
     @classmethod
     def _own(cls) -> tuple[str, ...]:
@@ -131,11 +137,11 @@ class LawTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> object:
+    def _known_keys(cls, given: object) -> object:
         """The entries of the law, converted; overrides what a table without a law does."""
-        if isinstance(data, Table):
-            return data
-        check_table(data)
+        if isinstance(given, Table):
+            return given
+        data = checked_table(given)
         default = cls.model_fields["law"].default
         name = data.get("law", default if isinstance(default, str) else None)
         if not isinstance(name, str):
@@ -146,26 +152,21 @@ class LawTable(Table):
         return {**{k: v for k, v in data.items() if k in cls._own()}, **cls._converted(data, law)}
 
     @classmethod
-    def find(cls, name: str, data: Mapping[str, object]) -> Any:
+    def find(cls, name: str, data: Mapping[str, object]) -> Law:
         """The law of a name, with what the table says besides; an error for validators where there is none."""
         shape = data.get("geometry")
         if isinstance(shape, str) and shape != SPHERE:
-            return on_geometry(cls.find(name, {**data, "geometry": None}), shape, _curve(data))
+            law = cls.find(name, {**data, "geometry": None})
+            assert isinstance(law, ContactLaw)  # no other table has this entry
+            return on_geometry(law, shape, _curve(data))
         known = laws(cls.kind)
         if name in known:
-            return known[name]
+            return known[name]  # type: ignore[no-any-return]
         if name == "expression":
             return cls._of_formula(data)
-        if ":" not in name and name not in cls.registry().names():
+        if ":" not in name and name not in REGISTRIES[cls.kind][0].names():
             raise invalid("is not one of the known values", nearest(name, tuple(known)), "law")
-        with as_invalid("law"):
-            found = cls.registry().get(name)
-        law = named(found, name)
-        if getattr(law, "kind", "") != cls.kind:
-            what = "ContactLaw" if cls.kind == "contact" else "FrictionLaw"
-            raise invalid(
-                f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
-            )
+        law = _of_user(cls.kind, name)
         from hpcclear.laws.checks import check_parameters  # slow to load: for laws of users alone
 
         with at("law"):
@@ -173,12 +174,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def registry(cls) -> Any:
-        """Where laws of users are found."""
-        return CONTACT_LAWS if cls.kind == "contact" else FRICTION_LAWS
-
-    @classmethod
-    def _of_formula(cls, data: Mapping[str, object]) -> Any:
+    def _of_formula(cls, data: Mapping[str, object]) -> Law:
         from hpcclear.laws.checks import check_parameters
         from hpcclear.laws.formula import law_of
 
@@ -199,7 +195,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
+    def _refuse_unknown(cls, data: Mapping[str, object], law: Law | None) -> None:
         others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
         entries = {} if law is None else {p.name: p for p in law.parameters}
         for key in data:
@@ -224,9 +220,9 @@ class LawTable(Table):
             )
 
     @classmethod
-    def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
+    def _converted(cls, data: Mapping[str, object], law: Law) -> dict[str, object]:
         """Values of the law's parameters, defaults filled in."""
-        found = {}
+        found = dict[str, object]()
         theirs = law.name not in laws(cls.kind)
         for parameter in law.parameters:
             if parameter.name in cls._own():
@@ -236,12 +232,16 @@ class LawTable(Table):
             if value is None:
                 example = parameter.example or f"a number in {parameter.unit or 1}"
                 raise invalid(
-                    f"the law {law.name!r} needs {_an(parameter)}",
+                    f"the law {law.name!r} needs "
+                    + (f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"),
                     f"Add {parameter.name} = {example} or so", parameter.name, None,
                 )  # fmt: skip
             found[parameter.name] = _value(parameter, value)
             if theirs and parameter.count == 1:
-                _declare(cls.kind, parameter)
+                quantity = quantity_of(parameter)
+                ENTRIES.setdefault(f"effects.{cls.kind}.{parameter.name}", {})[quantity.unit] = (
+                    quantity
+                )
         wrong = None if law.check is None else law.check(found)
         if wrong is not None:
             raise invalid(*wrong)
@@ -256,11 +256,6 @@ class LawTable(Table):
         given = {name: getattr(self, name) for name in self._own()}
         self._law = type(self).find(self.law, given)
 
-    @property
-    def declared(self) -> Any:
-        """The law, as `hpcclear.laws.declared` has it."""
-        return self._law
-
     def values(self) -> dict[str, Any]:
         """Values of the law's parameters by name, SI."""
         return dict(self.__pydantic_extra__ or {})
@@ -272,13 +267,13 @@ class LawTable(Table):
     @classmethod
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> JsonSchemaValue:
         """With the entries of all laws of this package."""
         made = handler.resolve_ref_schema(handler(schema))
         every = {one.name: one for one in _with_entries(cls.kind)}
         for law in every.values():
             for p in law.parameters:
-                made["properties"].setdefault(p.name, _schema(p, law, every))
+                made["properties"].setdefault(p.name, _schema(p, every))
         words = made["properties"]["law"].get("description")
         made["properties"]["law"] = {
             "anyOf": [{"enum": [*laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
@@ -288,29 +283,20 @@ class LawTable(Table):
         return made
 
 
-def _curve(data: Mapping[str, object]) -> Any:
+def _curve(data: Mapping[str, object]) -> Rows | None:
     """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
     if data.get("curve") is None:
         return None
     with at("curve", data["curve"]):
-        rows = Pairs("m", "N", ("depth", "force")).convert(data["curve"])
+        rows: Rows = Pairs("m", "N", ("depth", "force")).convert(data["curve"])
     rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
-    if (
-        rows[0][0] < 0.0
-        or rows[0][1] < 0.0
-        or (rows[0][0] == 0.0) != (rows[0][1] == 0.0)
-        or not rising
-    ):
-        raise invalid(
-            "depths and forces must rise from 0",
-            "Sort the rows; leave [0, 0] out",
-            "curve",
-            data["curve"],
-        )
+    if min(rows[0]) < 0.0 or (rows[0][0] == 0.0) != (rows[0][1] == 0.0) or not rising:
+        remedy = "Sort the rows; leave [0, 0] out"
+        raise invalid("depths and forces must rise from 0", remedy, "curve", data["curve"])
     return rows
 
 
-def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any]:
+def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> JsonSchemaValue:
     entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
     whose = [
         name for name, one in every.items() if parameter.name in {p.name for p in one.parameters}
@@ -327,20 +313,13 @@ def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any
     }
 
 
-def _an(parameter: Any) -> str:
-    return f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"
-
-
-def _value(parameter: Any, value: Any) -> Any:
+def _value(parameter: Parameter, value: object) -> float | tuple[float, ...]:
     """A parameter's value in SI; an error for validators names its entry."""
     quantity = quantity_of(parameter)
-    if parameter.count > 1:
-        if not isinstance(value, list | tuple) or len(value) != parameter.count:
-            raise invalid(
-                "a list of the right length is expected here", "Write it as [first, second]",
-                parameter.name, value,
-            )  # fmt: skip
-        with at(parameter.name, value):
-            return tuple(map(quantity.convert, value))
     with at(parameter.name, value):
-        return quantity.convert(value)
+        if parameter.count == 1:
+            return quantity.convert(value)
+        if not isinstance(value, list | tuple) or len(value) != parameter.count:
+            reason = "a list of the right length is expected here"
+            raise invalid(reason, "Write it as [first, second]")
+        return tuple(map(quantity.convert, value))

@@ -2,10 +2,11 @@
 `dynamics/planar/tables.py` makes a mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
 from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
@@ -46,15 +47,8 @@ class BarBending(Table):
     """Structural damping of each mode, relative to critical damping."""
 
 
-def check_bars(planar: Any) -> None:
-    """An error for validators unless every body of a linkage that bends is a bar that pins alone hold, at both its ends."""
-    for body in planar.bodies:
-        if body.bending is not None:
-            with at(f"bodies.{body.name}.bending", None):
-                _check_bar(planar, body)
-
-
-def _check_bar(planar: Any, body: Any) -> None:
+def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
+    """An error for validators unless a body that bends is a bar that pins alone hold, at both its ends."""
     if body.length is None:
         raise invalid(
             "only a bar can bend, and this body has no length",
@@ -102,17 +96,10 @@ def _check_bar(planar: Any, body: Any) -> None:
             )
 
 
-def check_scene(scene: Any, bending: Mapping[str, BarBending]) -> None:
-    """An error for validators where a scene has what does not go with bending; `bending`: tables by their bodies' paths."""
-    if bending and scene.wear is not None and scene.wear.waves and scene.worn_joints():
-        raise invalid(
-            "an angular wear profile needs rigid bodies, but a body bends",
-            'Set it to "uniform", or leave bending out',
-            key="wear.profile", value=scene.wear.profile,
-        )  # fmt: skip
+Numbers = TypeVar("Numbers", float, Array, float | Array)
 
 
-def slender_inertia(mass: Any, length: Any) -> Any:
+def slender_inertia(mass: Numbers, length: Numbers) -> Numbers:
     """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass
     would have."""
     return mass * length**2 / 12
@@ -145,9 +132,9 @@ class PlanarBody(Table):
     """Bending of a bar between two pins. Without it the bar is rigid."""
 
     @property
-    def own_inertia(self) -> Any:
+    def own_inertia(self) -> float:
         """Its inertia, kg m2, however that is stated."""
-        if self.inertia_ratio is None:
+        if self.inertia_ratio is None or self.length is None:
             return self.inertia
         return self.inertia_ratio * slender_inertia(self.mass, self.length)
 
@@ -276,7 +263,10 @@ class Planar(Table):
             if self.followed not in places:
                 raise invalid("is no point of a body", nearest(self.followed, places), "followed")
 
-        check_bars(self)
+        for body in self.bodies:
+            if body.bending is not None:
+                with at(f"bodies.{body.name}.bending", None):
+                    _check_bar(self, body)
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):
             for row in getattr(self, table):

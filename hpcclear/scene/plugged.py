@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import InputError
@@ -59,7 +60,7 @@ class PluginName(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, object]:
+    ) -> JsonSchemaValue:
         other = {"type": "string", "description": 'of a package, or "module:Name" of a file'}
         return {"anyOf": [{"enum": list(self.registry.ours())}, other]}
 

@@ -165,7 +165,7 @@ def record_of(scene: Scene, mapped: bool = False) -> np.dtype:
         "response": scene.responses_asked(),
         "impact": scene.impacts_asked(),
         "level": scene.bands(),
-        "pressure": has_pressure(scene),
+        "pressure": scene.effects.has_pressure,
         "rate": scene.objective.rate is not None,
         "wear": scene.worn_joints(),
         "energy": scene.numerics.energy,
@@ -174,9 +174,3 @@ def record_of(scene: Scene, mapped: bool = False) -> np.dtype:
     }
     names = [name for name, there in asked.items() if there]
     return record_type(len(scene.joint_labels), len(scene.bands()), names)
-
-
-def has_pressure(scene: Scene) -> bool:
-    """Whether the geometry of a scene's contacts has a pressure."""
-    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
-    return law is not None and law.geometry is not None and law.geometry.pressure is not None

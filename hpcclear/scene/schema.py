@@ -5,7 +5,8 @@ import inspect
 import itertools
 import sys
 from collections.abc import Iterator
-from typing import Any
+
+from pydantic.json_schema import JsonSchemaValue
 
 from hpcclear.base.objectives import ENDS
 from hpcclear.scene.fields import NUMBER, OF_FILE, Table
@@ -39,7 +40,7 @@ def _attribute_docs(table: type[Table]) -> dict[str, str]:
     return docs
 
 
-def _describe(definitions: dict[str, Any]) -> None:
+def _describe(definitions: JsonSchemaValue) -> None:
     """Describe entries by the words below them in the source, and put them in the order in which they are read.
 
     Pydantic can do so itself, but as soon as a table is defined: a fifth of a second of every command, rank and test.
@@ -58,7 +59,7 @@ def _describe(definitions: dict[str, Any]) -> None:
         entries |= own | {key: entries.pop(key) for key in tuple(entries)}
 
 
-def _as_written(definitions: dict[str, Any]) -> None:
+def _as_written(definitions: JsonSchemaValue) -> None:
     """Rows, pairs and rows like others as a file has them."""
     for row in definitions.values():
         if "name" in row["properties"]:  # the key it stands under
@@ -86,7 +87,7 @@ def _as_written(definitions: dict[str, Any]) -> None:
         rows[name]["additionalProperties"] = {"anyOf": [one, alike]}
 
 
-def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
+def _rows_of_catalogues(definitions: JsonSchemaValue) -> None:
     """Rows of catalogues with paths beside their names, costs as lists and by IT grades."""
     row = definitions["CatalogueRow"]
     row["properties"]["name"] = {"type": "string", "description": "name of the row"}
@@ -99,7 +100,7 @@ def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     ]  # fmt: skip
 
 
-def _with_files(schema: object) -> Any:
+def _with_files(schema: JsonSchemaValue) -> JsonSchemaValue:
     """A schema with references to `FileCurve` wherever a curve may come from a file."""
     if schema == OF_FILE:
         return {"$ref": "#/$defs/FileCurve"}
@@ -108,7 +109,7 @@ def _with_files(schema: object) -> Any:
     return [_with_files(entry) for entry in schema] if isinstance(schema, list) else schema
 
 
-def scene_schema() -> dict[str, Any]:
+def scene_schema() -> JsonSchemaValue:
     """JSON schema (draft 2020-12) of the scene file.
 
     It says which keys and kinds of values there are; what makes a mechanism is checked by
@@ -140,7 +141,7 @@ def scene_schema() -> dict[str, Any]:
     }
 
 
-def _inputs(definitions: dict[str, Any]) -> None:
+def _inputs(definitions: JsonSchemaValue) -> None:
     """Variables and random inputs of a study."""
     for name in ("StudyVariable", "RandomInput"):
         entries = definitions[name]["properties"]
@@ -157,7 +158,7 @@ def _inputs(definitions: dict[str, Any]) -> None:
         entries[key] = {"type": "string", "description": words}
 
 
-def _cases(definitions: dict[str, Any]) -> None:
+def _cases(definitions: JsonSchemaValue) -> None:
     """Cases of a study with their objectives and constraints, and its accuracy."""
     one_word = {"enum": ["mean", "deviation", "quantile", "cost"]}  # an exceedance needs a limit
     goals = {

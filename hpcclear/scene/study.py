@@ -14,7 +14,7 @@ from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import Sensitivity, of_both
-from hpcclear.scene.study_tables import StudyTables
+from hpcclear.scene.study_tables import StudyTables, claim
 
 _NO_INPUT, _NO_VARIABLE = "is not a random input of this study", "is not a study variable"
 LEAST_PER_INPUT = 3
@@ -80,13 +80,7 @@ class Study(StudyTables):
         owner: dict[str, str] = {}
         for variable in self.variables:
             for path in (*variable.paths, *self.own_entries(variable)):
-                if path in owner:
-                    raise invalid(
-                        f"{variable.name} and {owner[path]} both drive {path}",
-                        "Remove one, or give them different paths",
-                        key=f"variables.{variable.name}",
-                    )
-                owner[path] = variable.name
+                claim(owner, path, variable.name, f"variables.{variable.name}")
         for row in self.random:
             other = next(
                 (owner[path] for path in row.paths if owner.get(path, row.name) != row.name), None
@@ -100,12 +94,7 @@ class Study(StudyTables):
                     key=f"random.{row.name}",
                 )
             for path in row.paths:
-                if owner.setdefault(path, row.name) != row.name:
-                    raise invalid(
-                        f"{row.name} and {owner[path]} both drive {path}",
-                        "Remove one",
-                        key=f"random.{row.name}",
-                    )
+                claim(owner, path, row.name, f"random.{row.name}")
 
     def _check_width(self, row: RandomInput) -> None:
         if row.worn and row.name not in self.names:
@@ -241,8 +230,11 @@ class Study(StudyTables):
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
             *(("sensitivity.groups", group) for group in self.sensitivity.groups or ()),
         ]
-        for key, names in lists:
-            names = tuple(names)
+        for key, given in lists:
+            names = tuple(given)
+            if not names and "optimisation" not in key:
+                remedy = "Name one, or remove the empty list"
+                raise invalid("a model needs at least one input", remedy, key)
             for name in names:
                 check_known(name, self.names, _NO_VARIABLE, key)
             if len(set(names)) < len(names):
@@ -258,14 +250,6 @@ class Study(StudyTables):
                     f"{odd[0]!r} has no slope: it is a row of a table, or a width that f does not know",
                     "Leave it out", key=key,
                 )  # fmt: skip
-        if any(
-            not names for names in (self.surrogate.models or ()) + (self.sensitivity.groups or ())
-        ):
-            raise invalid(
-                "a model needs at least one input",
-                "Name one, or remove the empty list",
-                key="surrogate.models",
-            )
 
     def _check_groups(self) -> None:
         """The fixed parameter of response surfaces."""

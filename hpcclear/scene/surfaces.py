@@ -1,9 +1,10 @@
 """What lies on and between the surfaces of a joint with clearance, as in the scene file: wear, waves, an oil film."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from hpcclear.base.written import shown
 from hpcclear.laws import laws
+from hpcclear.laws.declared import FilmLaw
 from hpcclear.scene.fields import (
     Count,
     Length,
@@ -30,9 +31,9 @@ class Film(Table):
     """Combined roughness of both surfaces, m: the film thickness at which they touch."""
 
     @property
-    def law(self) -> Any:
+    def law(self) -> FilmLaw:
         """The model, as `hpcclear.laws.declared.FilmLaw`."""
-        return laws("film")[self.model]
+        return laws("film")[self.model]  # type: ignore[no-any-return]
 
 
 def check_film(film: Film | None, clearance: float, radius: float) -> None:

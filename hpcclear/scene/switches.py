@@ -145,8 +145,8 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
             "minimum_impact_speed": table.minimum_impact_speed,
         }
         kept = [floor]
-        if table.geometry is not None:
-            names = [one.name for one in table.declared.geometry.parameters]
+        if (shape := table.declared.geometry) is not None:
+            names = [one.name for one in shape.parameters]
             elastic |= {"geometry": table.geometry, "curve": table.curve} | {
                 name: table.value(name) for name in names
             }

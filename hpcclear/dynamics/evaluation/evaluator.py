@@ -24,7 +24,7 @@ from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers, Points
-from hpcclear.scene.scene import has_pressure, record_of
+from hpcclear.scene.scene import record_of
 
 VECTORS = 4
 """Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or
@@ -147,7 +147,7 @@ class Evaluator:
                 Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
             )
         self._problem = problem
-        self._record, self._pressed = record_of(scene), has_pressure(scene)
+        self._record, self._pressed = record_of(scene), scene.effects.has_pressure
         self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._values: dict[int, Array] = {}  # of what runs, for its pressures

@@ -55,9 +55,9 @@ def _of_bristles(scene: Scene, period: float) -> tuple[tuple[float, ...], tuple[
     The deflection's stand for the largest in steady sliding as those of lengths stand for 1 mm, so friction is as good as
     `rtol`. The coordinates themselves act on nothing: their tolerance is that times a revolution, which no step comes near.
     """
-    if not scene.bristles:
-        return (), ()
     table = scene.effects.friction
+    if not scene.bristles or table.declared.largest is None:
+        return (), ()
     largest = float(evaluate(table.declared.largest, table.values()))
     own = scene.numerics.absolute_tolerance / LENGTH * largest
     return (own * period,) * scene.bristles, (own,) * scene.bristles

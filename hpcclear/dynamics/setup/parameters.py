@@ -25,7 +25,6 @@ from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stif
 from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
 from hpcclear.scene.points import Numbers, Points
-from hpcclear.scene.scene import has_pressure
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
@@ -207,7 +206,7 @@ def widest_contact(scene: Scene, get: Numbers, forces: Array) -> dict[str, Array
 
     Empty where the geometry of contact has no pressure; NaN at places without a contact.
     """
-    if not has_pressure(scene):
+    if not scene.effects.has_pressure:
         return {}
     law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
     functions = {name: getattr(law.geometry, attribute) for name, attribute in WIDEST.items()}

@@ -101,10 +101,6 @@ class File(NamedTuple):
             self.refuse(text[:40], f"{what} is no finite number", "Save the file again")
         return value
 
-    def limit(self, count: int) -> None:
-        """InputError for more points, or parts of another kind, than a linkage has."""
-        limit(count, self.key)
-
     def scale(self, stated: float | None, words: str, where: str = "") -> float:
         """Return the unit of the lengths, m.
 

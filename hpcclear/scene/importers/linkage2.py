@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
-from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.file import GROUND, File, Names, limit, listed
 from hpcclear.scene.importers.points import Drawing, DrawnPoint
 
 _SIZES = {
@@ -71,7 +71,7 @@ def drawing_of(file: File) -> Drawing:
     file.scale(stated, shown)
     names = Names("connector", "P"), Names("link", "link")
     connectors = _connectors(root, file, names[0])
-    file.limit(len(connectors) // 2)
+    limit(len(connectors) // 2, file.key)
     bodies = _links(root, connectors, file, names[1])
     points, speeds, unstated, lone = [], {}, [], Counter[str]()
     for one in connectors.values():

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from hpcclear.base.units import to_si
-from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.file import GROUND, File, Names, limit, listed
 from hpcclear.scene.importers.points import Drawing, DrawnPoint
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
@@ -92,7 +92,7 @@ def _project(query: str, file: File) -> Drawing:
         file.refuse(len(fields), "has fewer fields than a project")
     flags, _, integers, kinds, *rest = fields
     first, second = _ends(rest, file)
-    file.limit(max(first, second - first) // 2)
+    limit(max(first, second - first) // 2, file.key)
     joints = [_joint(row, file) for row in rest[:first]]
     rows = rest[first + 1 : second]
     wrong = next((row for row in rows if row[0] not in _ROOTS + _MEMBERS), None)
@@ -172,7 +172,7 @@ def _table(text: str, file: File) -> Drawing:
                 rows.setdefault(section, []).append(row)
     except csv.Error as error:
         file.refuse("table", f"cannot be read ({error})")
-    file.limit(max(map(len, rows.values()), default=0) // 2)
+    limit(max(map(len, rows.values()), default=0) // 2, file.key)
     joints = [_joint_of(row, file) for row in rows.get("j", [])[1:]]
     links = [
         _Link(row[0], row[1], False, _ids(row, 6, file))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.units import factor, to_si
 from hpcclear.scene.delimited import SheetColumn
-from hpcclear.scene.importers.file import GROUND, File, Names
+from hpcclear.scene.importers.file import GROUND, File, Names, limit
 from hpcclear.scene.importers.points import Drawing, DrawnPoint
 from hpcclear.scene.sheets import Sheet, read
 
@@ -31,7 +31,7 @@ def drawing_of(file: File) -> Drawing:
     that stand still. `slide` is the angle of a guide.
     """
     sheet = read(file.path, "table of points")
-    file.limit(len(sheet.lines))
+    limit(len(sheet.lines), file.key)
     columns = _columns(sheet, file)
     x, y = (_lengths(sheet, columns.get(axis), file) for axis in ("x", "y"))
     rows = range(len(sheet.lines))
@@ -42,7 +42,7 @@ def drawing_of(file: File) -> Drawing:
     _check_apart([own for own, slide in zip(belonging, slides, strict=True) if slide is None], file)
     notes = [*points.notes(), *bodies.notes()]
     if "remark" in columns:
-        notes.append(f"SheetColumn {columns['remark'].heading!r} is not taken over")
+        notes.append(f"Column {columns['remark'].heading!r} is not taken over")
     made = [DrawnPoint(*one) for one in zip(names, x, y, belonging, slides, strict=True)]
     return Drawing(made, {}, notes)
 

@@ -27,7 +27,7 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.scene import has_pressure, record_of
+from hpcclear.scene.scene import record_of
 
 ITSELF = Points((), np.empty((1, 0)), ())
 """A scene as its only design."""
@@ -192,7 +192,7 @@ class Recording:
         done = np.concatenate(self._done)
         done = done[np.argsort(done["sample"], kind="stable")]
         for k, scene in enumerate(self._beside, 1):  # pressures by numbers of their own
-            if has_pressure(scene):
+            if scene.effects.has_pressure:
                 with_pressures(scene, ITSELF, [*ITSELF.values], done[k : k + 1])
         return done
 
