@@ -87,10 +87,7 @@ def read(
     ast.expr
         Its names are no words, its numbers are finite floats, and no operation is left between two numbers.
 
-    Raises
-    ------
-    FormulaError
-        If it is none, is too long or nested too deeply, or a part of numbers alone has no finite value.
+    Raises FormulaError if it is none, is too long or nested too deeply, or a part of numbers alone has no finite value.
     """
     if len(text) > longest:
         raise FormulaError(f"has more than {longest} characters", "Shorten it")
@@ -217,10 +214,7 @@ def number_of(node: ast.expr) -> float | None:
 def constant_of(node: ast.expr, named: Callable[[str], object]) -> float | None:
     """The value of a part made of numbers, and of names that `named` knows a number for; None for any other.
 
-    Raises
-    ------
-    FormulaError
-        If it has no finite value.
+    Raises FormulaError if it has no finite value.
     """
     match node:
         case ast.BinOp(left=left, right=right) if type(node.op) in _SIGNS:
@@ -248,10 +242,7 @@ def fold(node: ast.BinOp, written: ast.expr | None = None) -> ast.expr:
 
     `written`: the part as messages show it.
 
-    Raises
-    ------
-    FormulaError
-        If it has no finite value.
+    Raises FormulaError if it has no finite value.
     """
     if type(node.op) not in _SIGNS:
         raise FormulaError(f"contains more than arithmetic: {_shown(node)}")

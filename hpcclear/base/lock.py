@@ -199,10 +199,7 @@ class Lock:
     def take(self) -> bool:
         """Take the lock without a name if no process holds it at this moment; return whether it was free.
 
-        Raises
-        ------
-        OSError
-            The file cannot be made, or its file system has no such locks.
+        Raises OSError: the file cannot be made, or its file system has no such locks.
         """
         descriptor = os.open(self.path, host.flags("O_RDWR", "O_NOFOLLOW", "O_CREAT"), 0o600)
         try:

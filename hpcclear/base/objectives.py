@@ -140,10 +140,7 @@ class Objective:
     def of(self, records: Records) -> Array:
         """Its value of records (n,), NaN where something that it is made of is, or was not recorded.
 
-        Raises
-        ------
-        InputError
-            `value` raised something, or gives no number.
+        Raises InputError where `value` raised something, or gives no number.
         """
         names = ("rate",) if self.value is None else arguments(self.value)
         found = np.full(len(records), np.nan)

@@ -32,10 +32,7 @@ def private_folder(variable: str) -> Path:
     system's directory for temporary files; then ``hpcclear`` in the user's own cache, which is used with a remark. Where
     neither can be used it is a temporary one, which is removed at the end of the process.
 
-    Raises
-    ------
-    InputError
-        Nothing can be written anywhere.
+    Raises InputError: nothing can be written anywhere.
     """
     refusals: list[str] = []
     for candidate in _candidates(variable):

@@ -186,10 +186,7 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
     decided : bool
         Whether it is known that a point stands before decimals, also in "3.000".
 
-    Raises
-    ------
-    UnitError
-        If the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
+    Raises UnitError if the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
     """
     number, unit = quantity(text, target, decided)
     value = _product(Fraction(number), factor(unit, target), target)

@@ -22,10 +22,7 @@ _PREFERENCE = {128: "+prefer-128-bit", 256: "+prefer-256-bit", 512: "-prefer-256
 def asked_width() -> int | None:
     """The width that ``HPCCLEAR_VECTOR_BITS`` names; None where it is not set.
 
-    Raises
-    ------
-    InputError
-        If it is set to anything but 128, 256 or 512.
+    Raises InputError if it is set to anything but 128, 256 or 512.
     """
     asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
     if asked not in ("", *map(str, WIDTHS)):
@@ -39,10 +36,7 @@ def asked_width() -> int | None:
 def features() -> str | None:
     """The processor's features as they are passed to Numba; None where there is nothing to choose.
 
-    Raises
-    ------
-    InputError
-        Of `asked_width`.
+    Raises InputError as `asked_width`.
     """
     asked = asked_width()
     known = llvm.get_host_cpu_features()

@@ -72,10 +72,7 @@ class Registry(Generic[Plugin]):
         texts : mapping, optional
             Source texts by module, `Scene.plugin_texts`; while a scene is read, that scene's.
 
-        Raises
-        ------
-        InputError
-            There is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
+        Raises InputError: there is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
         """
         if name in self._ours:
             return cast(Plugin, self._of_ours(name))

@@ -112,10 +112,7 @@ def run_source(module: str, text: str) -> ModuleType:
     text : str
         Python.
 
-    Raises
-    ------
-    InputError
-        If it cannot be run: what it raised, and in which line.
+    Raises InputError if it cannot be run: what it raised, and in which line.
     """
     name = f"hpcclear_plugin_{module}_{digest(text)[:16]}"
     if name in sys.modules:

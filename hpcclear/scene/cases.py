@@ -1,7 +1,7 @@
 """Cases of a study: what is random in an optimisation, which statistics are minimised, and what designs must keep to."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import PrivateAttr, WithJsonSchema
@@ -14,6 +14,7 @@ from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import NUMBER, Number, Quantity, Table, invalid
 from hpcclear.scene.named import NAME
 from hpcclear.scene.plugged import PluginName, as_invalid
+from hpcclear.scene.variables import StudyVariable
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
 
@@ -69,7 +70,7 @@ class Goal(Table):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
 
-    _priced: tuple[Any, ...] = PrivateAttr(())
+    _priced: tuple[StudyVariable, ...] = PrivateAttr(())
     _place: int = PrivateAttr(0)
 
     def placed(self, place: int) -> None:
@@ -81,7 +82,7 @@ class Goal(Table):
         """Where its response stands among what is simulated of designs (`hpcclear.study.truth`)."""
         return self._place
 
-    def priced_by(self, variables: tuple[Any, ...]) -> None:
+    def priced_by(self, variables: tuple[StudyVariable, ...]) -> None:
         """Take the study variables that say what a design costs."""
         self._priced = variables
 
@@ -90,7 +91,7 @@ class Goal(Table):
         """Whether the design alone says what it is."""
         return self.formula is not None or self.statistic == "cost"
 
-    def of_design(self, design: Mapping[str, Any]) -> Array:
+    def of_design(self, design: Mapping[str, Array | float]) -> Array:
         """Its value for a design, or for designs (n,), SI by name; of what is `exact`."""
         if self.formula is not None:
             return value_of(self.formula, design)
@@ -152,7 +153,7 @@ class Constraint(Goal):
 MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
-def in_si(case: object, objective: object, key: str) -> Any:
+def in_si(case: object, objective: object, key: str) -> object:
     """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     An error for validators where a limit is no number of that unit; its key begins with `key`.
@@ -170,7 +171,7 @@ def in_si(case: object, objective: object, key: str) -> Any:
     return made
 
 
-def _goal(row: object, unit: str, key: str) -> Any:
+def _goal(row: object, unit: str, key: str) -> object:
     if isinstance(row, str):
         return {"statistic": row}
     if not isinstance(row, Mapping):
@@ -182,8 +183,7 @@ def _goal(row: object, unit: str, key: str) -> Any:
     own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
     for name, its in (("limit", unit), ("most", own)):
         if name in made:
-            with at(f"{key}.{name}", made[name]):
-                made[name] = Quantity(its).convert(made[name])
+            made[name] = Quantity(its).convert(made[name], f"{key}.{name}")
     return made
 
 

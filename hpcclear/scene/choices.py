@@ -11,11 +11,12 @@ the reciprocal of the square; F. H. Speckhart, "Calculation of tolerance based o
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import model_validator
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import nearest
 from hpcclear.scene.fields import Number, Quantity, Table, check_known, invalid
 from hpcclear.scene.fits import fit_of
@@ -131,7 +132,7 @@ class Cost(Table):
     """Cost of each option of the variable, in their order."""
 
     @classmethod
-    def in_si(cls, given: object, unit: str, fits: Sequence[object] = ()) -> Any:
+    def in_si(cls, given: object, unit: str, fits: Sequence[object] = ()) -> object:
         """A cost as a file has it, as the entries of this table: a list for all options, for fits a table by IT grades; errors
         for validators."""
         if isinstance(given, (list, tuple)):
@@ -162,7 +163,7 @@ class Cost(Table):
         if self.law == "reciprocal" and self.scale is not None:
             raise invalid('belongs to "exponential"', "Remove it", "scale")
 
-    def of(self, values: Any, options: Sequence[float] | None) -> Any:
+    def of(self, values: Array | float, options: Sequence[float] | None) -> Array | float:
         """Costs of values, a number or (n,)."""
         if self.options is not None:
             assert options is not None  # by validation
@@ -172,6 +173,7 @@ class Cost(Table):
         assert self.cost is not None  # both by validation
         if self.law == "reciprocal":
             return self.fixed + self.cost * (self.at / values) ** self.power
+        assert self.scale is not None
         return self.fixed + self.cost * np.exp((self.at - values) / self.scale)
 
 

@@ -64,10 +64,7 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
     where : callable
         Place of a cell by its number, in errors.
 
-    Raises
-    ------
-    InputError
-        A cell is none, is another kind than those above it, or the order of day and month is open.
+    Raises InputError: a cell is none, is another kind than those above it, or the order of day and month is open.
     """
     order = _order(cells, where)
     made, gone, first, last = list[float](), 0, None, None

@@ -9,7 +9,7 @@ from pydantic import field_validator, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
-from hpcclear.scene.fields import check_known, invalid
+from hpcclear.scene.fields import Content, check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.joints import Guide, length_path
 from hpcclear.scene.named import SHORT_NAMES
@@ -22,18 +22,18 @@ class ConsistentTables(SceneTables):
 
     @field_validator("format_version", mode="before")
     @classmethod
-    def _version_is_a_number(cls, value: Any) -> Any:
+    def _version_is_a_number(cls, value: object) -> object:
         if isinstance(value, bool):  # equal to 1 in Python
             raise invalid("true or false is not a version", "Write format_version = 1")
         return value
 
     @model_validator(mode="before")
     @classmethod
-    def _kind_of_mechanism(cls, data: Any) -> Any:
+    def _kind_of_mechanism(cls, data: object) -> object:
         """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
-        mechanism = data.get("mechanism") if isinstance(data, Mapping) else None
-        if not isinstance(mechanism, Mapping):
+        if not isinstance(data, Mapping) or not isinstance(data.get("mechanism"), Mapping):
             return data
+        mechanism = data["mechanism"]
         data = with_shares(with_fits_of_joints(data))
         kind = mechanism.get("kind", "slider-crank")
         for table in ("drive", "joints"):
@@ -124,21 +124,16 @@ class ConsistentTables(SceneTables):
         if contact is not None and contact.has_length:
             for name in clearance:
                 if length_path(self.clearance_joint(name)) is None:
-                    entry, part = (
-                        ("width", "slider") if name in self.guides() else ("length", "bearing")
-                    )
+                    is_pin = name in self.pins()
+                    entry, part = ("length", "bearing") if is_pin else ("width", "slider")
                     raise invalid(
                         f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
                         f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
                     )  # fmt: skip
-        if clearance and self.effects.contact is None:
-            raise invalid(
-                "a clearance joint needs a contact law",
-                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
-                'or make the joints ideal (kind = "ideal")',
-                key="effects.contact",
-                value=None,
-            )
+        if clearance and contact is None:
+            law = 'contact = { law = "lankarani-nikravesh", restitution = 0.9 }'
+            remedy = f'Add {law}, or make the joints ideal (kind = "ideal")'
+            raise invalid("a clearance joint needs a contact law", remedy, "effects.contact", None)
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
                 "friction acts in joints with clearance, but all joints are ideal",
@@ -218,7 +213,7 @@ class ConsistentTables(SceneTables):
             raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
 
 
-def _kind_of(rows: Mapping[str, Any], row: Any) -> str:
+def _kind_of(rows: Content, row: Content) -> str:
     """Kind of a joint of a linkage, which may be ``like`` another."""
     return str(row.get("kind") or rows[row["like"]]["kind"])
 

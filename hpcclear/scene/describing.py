@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from hpcclear.plugins.sources import digest
 from hpcclear.scene.driving import CrankTorque, speed_entry
@@ -175,18 +174,12 @@ _JOINT = {
 
 def cited_by(scene: SceneTables) -> str:
     """Title of the work the mechanism of a scene is taken from, "" for one of its user's own."""
-    numbers = {path: scene.number(path) for path in scene.numeric_paths()}
-    return TITLE if _holds(numbers, scene.clearance_joints()) else ""
-
-
-def _holds(numbers: Mapping[str, float], joints: tuple[str, ...]) -> bool:
     expected = {f"mechanism.{name}": value for name, value in _LENGTHS.items()}
-    for joint in joints:
+    for joint in scene.clearance_joints():
         expected |= {f"joints.{joint}.{name}": value for name, value in _JOINT.items()}
-    return bool(joints) and all(
-        math.isclose(numbers.get(path, math.nan), value, rel_tol=1e-9)
-        for path, value in expected.items()
-    )
+    numbers = {path: scene.number(path) for path in scene.numeric_paths() if path in expected}
+    same = (math.isclose(numbers[path], expected[path], rel_tol=1e-9) for path in numbers)
+    return TITLE if len(numbers) == len(expected) > len(_LENGTHS) and all(same) else ""
 
 
 NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
@@ -196,7 +189,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     """What is on, in words."""
     for name in scene.clearance_joints():
         size = scene.shown(f"{scene.joint_key(name)}.clearance")
-        joint: Any = scene.clearance_joint(name)
+        joint = scene.clearance_joint(name)
         kind = {"slide": "guide", "slot": "slot"}.get(joint.kind, "joint")
         where = "the guide" if kind == name == "guide" else f"{kind} {name}"
         yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
@@ -246,10 +239,8 @@ def warnings(scene: SceneTables) -> Iterator[str]:
     for bar in scene.linkage.bodies:
         if bar.length is None:
             continue
-        key, least = (
-            scene.path_in_scene(f"mechanism.bodies.{bar.name}"),
-            slender_inertia(bar.mass, bar.length),
-        )
+        key = scene.path_in_scene(f"mechanism.bodies.{bar.name}")
+        least = slender_inertia(bar.mass, bar.length)
         if 0.0 < bar.own_inertia < least * (1 - 1e-12):
             yield (
                 f"{key}.inertia = {scene.in_unit(bar.own_inertia, 'kg*m**2')} is less than a thin uniform "
@@ -261,7 +252,7 @@ def warnings(scene: SceneTables) -> Iterator[str]:
                 f"which are at 0 and {scene.shown(f'{key}.length')}"
             )
     for name in scene.pins():
-        joint: Any = scene.clearance_joint(name)
+        joint = scene.pin(name)
         start = joint.start_eccentricity
         if start.x**2 + start.y**2 > joint.clearance**2 * (1 + 1e-12):
             yield (

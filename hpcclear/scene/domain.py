@@ -43,10 +43,7 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
         Random inputs by whose reach the box grows, so that a surrogate trained on it never
         extrapolates. Those that are absolute, or no variables among `names`, change nothing.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the widened box would hold inertias of 0 or below.
+    Raises InputError if a name is unknown, or the widened box would hold inertias of 0 or below.
     """
     study = scene.required_study
     chosen = study.names if names is None else tuple(names)

@@ -1,7 +1,7 @@
 """What moves a mechanism: drives of bodies."""
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,14 +20,14 @@ Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
 
 
-def by_interval(drive: Any) -> bool:
+def by_interval(drive: object) -> bool:
     """Whether a time replaces the revolution of a drive."""
     return getattr(drive, "interval", None) is not None
 
 
-def speed_entry(drive: Any) -> str:
+def speed_entry(drive: "CrankSpeed | CrankTorque") -> str:
     """The entry of a drive that gives its speed: `speed`, or of a torque `expected_speed` or `initial_speed`."""
-    if hasattr(drive, "speed"):
+    if isinstance(drive, CrankSpeed):
         return "speed"
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
 

@@ -62,6 +62,9 @@ def hint(word: object) -> str:
     return ""
 
 
+Content = dict[str, Any]
+"""Tables as a file has them: numbers, texts, lists and tables by their names; whatever stands there until it is valid."""
+
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
 LONGEST_CURVE = 100_000
@@ -133,7 +136,7 @@ class Table(BaseModel):
 class Converted:
     """What an entry is made into: an annotation whose `convert` is pydantic's validator."""
 
-    def convert(self, value: object) -> Any:
+    def convert(self, value: object) -> object:
         """The value as the scene holds it; an error for validators where it is none."""
         raise NotImplementedError
 
@@ -294,24 +297,18 @@ OF_FILE = {"type": "object", "title": "FileCurve"}
 class NamedRows:
     """A table of named rows, kept in file order as a tuple, because a dict would not be frozen."""
 
-    def rows(self, value: object) -> Any:
+    def rows(self, value: object) -> object:
         """``{name: {...}}`` as ``[{"name": name, ...}]``."""
-        if isinstance(value, Mapping):
-            rows: list[object] = []
-            for name, row in value.items():
-                if not isinstance(row, Mapping):
-                    raise invalid(
-                        "a table is expected here", "Write it as { key = value }", key=str(name)
-                    )
-                if "name" in row:
-                    raise invalid(
-                        "the name is the key of this table", "Remove it", key=f"{name}.name"
-                    )
-                rows.append({"name": name, **row})
-            return rows
         if isinstance(value, tuple):
             return value
-        raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+        if not isinstance(value, Mapping):
+            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+        for name, row in value.items():
+            if not isinstance(row, Mapping):
+                raise invalid("a table is expected here", "Write it as { key = value }", str(name))
+            if "name" in row:
+                raise invalid("the name is the key of this table", "Remove it", f"{name}.name")
+        return [{"name": name, **row} for name, row in value.items()]
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -372,19 +369,19 @@ class NamedPlace(Position):
 class PlaceRows(NamedRows):
     """``{name = [x, y]}`` as named rows."""
 
-    def rows(self, value: object) -> Any:
+    def rows(self, value: object) -> object:
         """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; an error for validators where it is none."""
-        if not isinstance(value, (Mapping, tuple)):
+        if isinstance(value, tuple):
+            return value
+        if not isinstance(value, Mapping):
             raise invalid("named points are expected here", "Write { name = [x, y] }")
-        if isinstance(value, Mapping):
-            for name, place in value.items():
-                if isinstance(place, (list, tuple)) and len(place) != 2:
+        places = dict(value)
+        for name, place in places.items():
+            if isinstance(place, (list, tuple)):
+                if len(place) != 2:
                     raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
-            value = {
-                name: {"x": place[0], "y": place[1]} if isinstance(place, (list, tuple)) else place
-                for name, place in value.items()
-            }
-        return super().rows(value)
+                places[name] = {"x": place[0], "y": place[1]}
+        return super().rows(places)
 
 
 NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]

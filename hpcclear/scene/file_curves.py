@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
-from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, Content, PositiveLength, Quantity, Table, invalid
 from hpcclear.scene.paths import curves, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 from hpcclear.scene.validation import validated
@@ -114,10 +114,7 @@ def pairs_of(
     turns : int
         Of a revolution of the scene: a file of one turn is repeated as often.
 
-    Raises
-    ------
-    InputError
-        If the file is no such curve; it says what was found.
+    Raises InputError if the file is no such curve; it says what was found.
     """
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
     kind = _kind(curve, unit, key)
@@ -293,10 +290,7 @@ def with_values(
     folder : path
         What names of files are relative to.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read, has no such column or a cell in it is no number.
+    Raises InputError if a file cannot be read, has no such column or a cell in it is no number.
     """
     read_as = []
     for key, row in files_named(content).items():
@@ -307,7 +301,7 @@ def with_values(
             )
         made: object
         if key.startswith("study.random."):
-            made, shown = _with_values(row, key, folder)
+            made, shown = _with_values(row, file, key, folder)
         else:
             made, shown = _curve(content, row, key, folder)
         content = replace(content, key, made)
@@ -317,9 +311,9 @@ def with_values(
     return content, read_as
 
 
-def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, object]]:
     """Return the tables of a parsed scene that name a file, by their dotted keys."""
-    found: dict[str, Mapping[str, Any]] = {}
+    found: dict[str, Mapping[str, object]] = {}
     for key, entry in content.items():
         if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
             path = f"{prefix}{key}"
@@ -327,8 +321,10 @@ def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Ma
     return found
 
 
-def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> tuple[dict[str, Any], str]:
-    file, column = row["file"], row.get("column")
+def _with_values(
+    row: Mapping[str, object], file: str, key: str, folder: Path
+) -> tuple[Content, str]:
+    column = row.get("column")
     if "values" in row:
         raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
     if column is not None and not isinstance(column, str):

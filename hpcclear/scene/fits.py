@@ -15,7 +15,7 @@ from pydantic import model_validator
 from hpcclear.base import tolerances
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Bounds, Quantity, Table, invalid
+from hpcclear.scene.fields import Bounds, Content, Quantity, Table, invalid
 
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 """Largest size of each range, mm."""
@@ -190,13 +190,7 @@ class Tolerance(Table):
     def _in_metres(cls, data: object) -> object:
         if not isinstance(data, Mapping) or "range" not in data:
             return data
-        ends = data["range"]
-        if not isinstance(ends, (list, tuple)) or len(ends) != 2:
-            raise invalid("two diameters are expected here", "Write [smallest, largest]", "range")
-        low, high = (_DIAMETER.convert(one, "range") for one in ends)
-        if not low < high:
-            raise invalid("the diameters do not rise", "Write [smallest, largest]", "range")
-        return {**data, "range": (low, high)}
+        return {**data, "range": _DIAMETER.range(data["range"], "range")}
 
     def _check(self) -> None:
         if self.distribution == "uniform" and (self.cp, self.cpk, self.towards) != (1, None, None):
@@ -220,7 +214,7 @@ class Tolerance(Table):
         return tolerances.part(given, self.cp, cpk, self.towards or "upper", self.inspected)
 
 
-def law_of(entries: Mapping[str, Any]) -> tolerances.FitClearance:
+def law_of(entries: Content) -> tolerances.FitClearance:
     """The distribution of a radial clearance by the entries of a random input; raises an error for validators."""
     parts = []
     fit = None if entries.get("fit") is None else fit_of(entries["fit"])

@@ -1,17 +1,16 @@
 """Fits of joints in the content of a scene: random inputs that follow them, and entries that stand in each other's place."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Quantity, invalid
+from hpcclear.scene.fields import Content, Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
 from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
 
 
-def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:
+def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, object]:
     """The content of a file whose random inputs with distribution "fit" say which: that of the joints that they drive."""
     for name, row, joints in _rows_of_fits(content):
         if "fit" in row or not joints:
@@ -22,7 +21,7 @@ def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:
     return content
 
 
-def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
+def with_shares(content: Mapping[str, object]) -> Mapping[str, object]:
     """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about;
     where the study varies that, it stays a share, and the input is `relative`. An error for validators if the number is not
     there.
@@ -82,14 +81,14 @@ def _paths(name: str, row: Mapping[str, object], variable: object) -> tuple[str,
     return paths_of(name, variable)
 
 
-def _number(content: Mapping[str, object], path: str) -> Any:
+def _number(content: Mapping[str, object], path: str) -> object:
     """What a file has at a path, a clearance by its fit, too."""
     owner, _, leaf = path.rpartition(".")
     table = _at(content, owner)
     return with_clearance(table).get(leaf) if isinstance(table, Mapping) else None
 
 
-def entry_replaced(content: Mapping[str, object], path: str, value: object) -> dict[str, Any]:
+def entry_replaced(content: Mapping[str, object], path: str, value: object) -> Content:
     """The content of a scene with an entry replaced, and without what it stands in place of: a fit takes a clearance's."""
     owner, _, leaf = path.rpartition(".")
     before = _at(content, owner)

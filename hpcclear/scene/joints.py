@@ -1,6 +1,6 @@
 """Joints in the scene file: materials, friction of ideal joints, pins in bearings, guides and slots with clearance."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -105,9 +105,9 @@ class PinInBearing(Table):
         check_waves(self.out_of_round, self.clearance, self.film)
 
 
-def length_path(joint: Any) -> str | None:
+def length_path(joint: "PinInBearing | OfContacts") -> str | None:
     """Where a joint with clearance has its length at right angles to the plane: its own entry, or that of its film or wear."""
-    if joint.corners:
+    if isinstance(joint, OfContacts):
         return None if joint.width is None else "width"
     if joint.length is not None:
         return "length"

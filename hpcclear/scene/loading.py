@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import tomli_w
 
@@ -35,7 +34,7 @@ _CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the la
 
 
 def load_scene(
-    source: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), *, trust: bool = False
+    source: str | Path | Mapping[str, object], overrides: Sequence[str] = (), *, trust: bool = False
 ) -> Scene:
     """Read and validate a scene.
 
@@ -83,11 +82,13 @@ def load_scene(
     else:
         # an empty line ends the notes, whatever a file's own first comment says
         own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
-        scene._text = notes + own + _plugins(scene)
+        plugins = {} if scene.plugins is None else {"plugins": plain(scene.plugins)}
+        below = "\n\n" + tomli_w.dumps(plugins, multiline_strings=True) if plugins else ""
+        scene._text = notes + own + below
     return scene
 
 
-def quantities(entries: Iterable[tuple[str, Any]]) -> dict[str, str]:
+def quantities(entries: Iterable[tuple[str, object]]) -> dict[str, str]:
     """Return the text of every quantity with its unit among entries (path, value), by its path; in a list by its place."""
     found = {}
     for path, value in entries:
@@ -138,13 +139,6 @@ def _change(line: str) -> tuple[str, object]:
         raise InputError("scene", line, reason, "Correct the line, or remove it") from None
 
 
-def _plugins(scene: Scene) -> str:
-    """Where plug-ins of a scene come from, to stand below the tables of its file."""
-    if scene.plugins is None:
-        return ""
-    return "\n\n" + tomli_w.dumps({"plugins": plain(scene.plugins)}, multiline_strings=True)
-
-
 def _beside(folder: Path, module: str) -> str | None:
     """The text of a Python file beside the scene file, None where there is none."""
     path = folder / f"{module}.py"
@@ -187,12 +181,8 @@ def parse(text: str, name: str) -> dict[str, object]:
 def _override(text: str) -> tuple[str, object]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not dotted(key):
-        raise InputError(
-            "--set",
-            text,
-            "is not of the form key.path=value",
-            "Write, say, --set numerics.rtol=1e-8",
-        )
+        reason = "is not of the form key.path=value"
+        raise InputError("--set", text, reason, "Write, say, --set numerics.rtol=1e-8")
     try:
         parsed = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):

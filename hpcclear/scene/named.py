@@ -2,10 +2,9 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
-from hpcclear.scene.fields import Table, check_known, invalid
+from hpcclear.scene.fields import Content, Table, check_known, invalid
 from hpcclear.scene.paths import quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
@@ -87,7 +86,7 @@ class NamedInput(Table):
     """Scene entries that are set to its value."""
 
 
-def with_paths(data: Mapping[str, object]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def with_paths(data: Mapping[str, object]) -> tuple[Content, tuple[str, ...]]:
     """A row of a file with its `paths` resolved, and these; () if it has none already."""
     paths = () if data.get("paths") == () else resolved_paths(data)
     return {key: value for key, value in data.items() if key != "path"} | {"paths": paths}, paths
@@ -98,8 +97,9 @@ def paths_of(name: str, row: Mapping[str, object]) -> tuple[str, ...]:
     return texts_in(row.get("paths", row.get("path", SHORT_NAMES.get(name))))
 
 
-def texts_in(value: Any) -> tuple[str, ...]:
+def texts_in(value: object) -> tuple[str, ...]:
     """One text or several, of an entry that is not validated yet."""
     several = (value,) if isinstance(value, str) else value
-    known = isinstance(several, (list, tuple)) and all(isinstance(one, str) for one in several)
-    return tuple(several) if known else ()
+    if not isinstance(several, (list, tuple)) or not all(isinstance(one, str) for one in several):
+        return ()
+    return tuple(several)

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from hpcclear.base.errors import InputError
 from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import NamedRows, Quantity
+from hpcclear.scene.fields import Content, NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
@@ -57,7 +57,7 @@ _SEEN: dict[str, str] = {}
 
 
 @contextmanager
-def of_kinds(content: Mapping[str, Any]) -> Iterator[None]:
+def of_kinds(content: Mapping[str, object]) -> Iterator[None]:
     """Within it, `quantities` knows the kinds of the loads of a scene's content, on which units of their entries depend."""
     mechanism = content.get("mechanism")
     rows = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
@@ -196,7 +196,7 @@ def described(paths: Sequence[str]) -> str:
     return alike.pop() if len(paths) > 1 and len(alike) == 1 else " and ".join(found)
 
 
-def replace(content: Mapping[str, object], path: str, value: object) -> dict[str, Any]:
+def replace(content: Mapping[str, object], path: str, value: object) -> Content:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
     What is not a table on the way to it is replaced by one; the model then says what is wrong with

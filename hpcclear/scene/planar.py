@@ -2,7 +2,7 @@
 `dynamics/planar/tables.py` makes a mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -290,7 +290,7 @@ class Planar(Table):
         return written
 
 
-def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
+def _with_model(table: str, name: str, rows: Mapping[str, object]) -> object:
     row = rows[name]
     if not isinstance(row, Mapping) or "like" not in row:
         return row
@@ -323,13 +323,7 @@ def turns_of(planar: Planar) -> int:
 
 
 def main_drive(planar: Planar) -> PlanarDrive:
-    """The drive that gives the period.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The drive that gives the period; raises InputError if there is none."""
     if not planar.drives:
         raise InputError(
             "mechanism.drives", None, "nothing drives the mechanism",

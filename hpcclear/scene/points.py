@@ -153,11 +153,8 @@ def check_points(
 ) -> None:
     """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
 
-    Raises
-    ------
-    InputError
-        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
-        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
+    Raises InputError if a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's radius,
+    friction at rest is less than sliding, or a rod is not longer than its crank.
     """
     points = expanded(scene.study, points)
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
@@ -238,11 +235,7 @@ def read_points(path: str | Path, scene: Scene) -> Points:
     Points
         In SI.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a cell is no number; it names row (line of the file) and
-        column.
+    Raises InputError if the file cannot be read, or a cell is no number; it names row (line of the file) and column.
     """
     key, sheet = str(path), read(Path(path))
     labels, columns = [], []

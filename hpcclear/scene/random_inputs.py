@@ -1,7 +1,7 @@
 """Random inputs of a study, about the design or wherever it is, and their distributions by name: ours, any continuous one of
 scipy.stats, and plug-ins."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from functools import cached_property, partial
 from math import inf, log1p, sqrt
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -13,7 +13,7 @@ from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.plugins import DISTRIBUTIONS
 from hpcclear.plugins.sources import SCIPY
-from hpcclear.scene.fields import LONGEST_CURVE, Bounds, Number, Numbers, Quantity, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, Bounds, Content, Number, Numbers, Quantity, invalid
 from hpcclear.scene.fits import Tolerance, law_of
 from hpcclear.scene.named import NamedInput, Range, with_paths
 from hpcclear.scene.paths import quantities
@@ -27,30 +27,30 @@ _TESTED = np.array([1e-9, 1e-3, 0.5, 1 - 1e-3, 1 - 1e-9])
 
 
 class Form(NamedTuple):
-    """One of our distributions: entries that it needs, those that it may have, and its quantiles made of them."""
+    """One of our distributions: its quantiles made of entries, those that it needs, and those that it may have."""
 
-    needs: frozenset[str]
-    may_have: frozenset[str]
-    law: Callable[[Mapping[str, Any]], quantiles.Quantiles]
+    law: Callable[[Content], quantiles.Quantiles]
+    needs: Set[str] = frozenset()
+    may_have: Set[str] = frozenset()
 
 
-def _ends(entries: Mapping[str, Any]) -> tuple[float, float]:
+def _ends(entries: Content) -> tuple[float, float]:
     return entries.get("range", (-inf, inf))
 
 
-def _middle_and_reach(entries: Mapping[str, Any]) -> tuple[float, float]:
+def _middle_and_reach(entries: Content) -> tuple[float, float]:
     if "range" in entries:
         lower, upper = entries["range"]
         return (lower + upper) / 2, (upper - lower) / 2
     return entries.get("mean", 0.0), entries.get("half_width", inf)
 
 
-def _normal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
+def _normal(entries: Content) -> quantiles.Quantiles:
     middle, reach = _middle_and_reach(entries)
     return quantiles.Normal(middle, entries["deviation"], reach)
 
 
-def _beta(entries: Mapping[str, Any]) -> quantiles.Quantiles:
+def _beta(entries: Content) -> quantiles.Quantiles:
     middle, reach = _middle_and_reach(entries)
     lower, upper = entries.get("range", (middle - reach, middle + reach))
     a, b = entries["shapes"]
@@ -58,20 +58,20 @@ def _beta(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     return quantiles.Named("beta", over, lower, upper)
 
 
-def _lognormal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
+def _lognormal(entries: Content) -> quantiles.Quantiles:
     """By mean and standard deviation of all of it, before it is cut off."""
     square = (entries["deviation"] / entries["mean"]) ** 2
     over = ("s", sqrt(log1p(square))), ("scale", entries["mean"] / sqrt(1.0 + square))
     return quantiles.Named("lognorm", over, *_ends(entries))
 
 
-def _weibull(entries: Mapping[str, Any]) -> quantiles.Quantiles:
+def _weibull(entries: Content) -> quantiles.Quantiles:
     begin = entries.get("location", 0.0)
     over = ("c", entries["shape"]), ("loc", begin), ("scale", entries["scale"])
     return quantiles.Named("weibull_min", over, *_ends(entries))
 
 
-def _worn(entries: Mapping[str, object]) -> quantiles.Quantiles:
+def _worn(entries: Content) -> quantiles.Quantiles:
     raise InputError(
         f"study.random.{entries['name']}.distribution", "wear",
         "is known only after the wear simulation of [wear], which `hpcclear run` does first",
@@ -79,25 +79,25 @@ def _worn(entries: Mapping[str, object]) -> quantiles.Quantiles:
     )  # fmt: skip
 
 
-def _ours() -> dict[str, Form]:
-    made = {
-        "uniform": ("half_width", "mean", lambda e: quantiles.Uniform(*_middle_and_reach(e))),
-        "normal": ("deviation", "mean", _normal),
-        "truncated-normal": ("deviation half_width", "mean", _normal),
-        "lognormal": ("mean deviation", "range about_design", _lognormal),
-        "beta": ("shapes half_width", "mean", _beta),
-        "weibull": ("scale shape", "location range about_design", _weibull),
-        "samples": ("values", "about_design", lambda e: quantiles.Empirical(e["values"])),
-        "fit": ("", "fit bore pin range", law_of),
-        "wear": ("cycles", "half_width", _worn),
-    }
-    return {
-        name: Form(frozenset(needs.split()), frozenset(others.split()), law)
-        for name, (needs, others, law) in made.items()
-    }
+def _uniform(entries: Content) -> quantiles.Quantiles:
+    return quantiles.Uniform(*_middle_and_reach(entries))
 
 
-OURS = _ours()
+def _samples(entries: Content) -> quantiles.Quantiles:
+    return quantiles.Empirical(entries["values"])
+
+
+OURS = {
+    "uniform": Form(_uniform, {"half_width"}, {"mean"}),
+    "normal": Form(_normal, {"deviation"}, {"mean"}),
+    "truncated-normal": Form(_normal, {"deviation", "half_width"}, {"mean"}),
+    "lognormal": Form(_lognormal, {"mean", "deviation"}, {*OF_LIMITS}),
+    "beta": Form(_beta, {"shapes", "half_width"}, {"mean"}),
+    "weibull": Form(_weibull, {"scale", "shape"}, {"location", *OF_LIMITS}),
+    "samples": Form(_samples, {"values"}, {"about_design"}),
+    "fit": Form(law_of, may_have={"fit", "bore", "pin", "range"}),
+    "wear": Form(_worn, {"cycles"}, {"half_width"}),
+}
 for _name, _form in OURS.items():
     DISTRIBUTIONS.add(_name, _form)
 
@@ -118,7 +118,7 @@ def form_of(name: str, parameters: Mapping[str, float]) -> Form:
         with as_invalid("distribution"):
             factory = DISTRIBUTIONS.get(name)
         law = partial(_of_plugin, name, factory, parameters)
-    return Form(frozenset(), OF_LIMITS | {"parameters"}, law)
+    return Form(law, may_have=OF_LIMITS | {"parameters"})
 
 
 def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[str, float]:
@@ -132,9 +132,7 @@ def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[st
     return found
 
 
-def _of_scipy(
-    own: str, parameters: Mapping[str, float], entries: Mapping[str, object]
-) -> quantiles.Cut:
+def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> quantiles.Cut:
     from scipy import stats
 
     one = getattr(stats, own, None)
@@ -160,7 +158,7 @@ def _of_scipy(
 
 
 def _of_plugin(
-    name: str, factory: Any, parameters: Mapping[str, float], entries: Mapping[str, Any]
+    name: str, factory: Any, parameters: Mapping[str, float], entries: Content
 ) -> quantiles.Cut:
     try:
         whole = factory(**parameters)
@@ -349,10 +347,7 @@ class RandomInput(NamedInput):
     def law(self) -> quantiles.Quantiles:
         """Its quantile function: of its value where it is absolute, else of its difference from the design, SI.
 
-        Raises
-        ------
-        InputError
-            Only a wear simulation gives its values.
+        Raises InputError: only a wear simulation gives its values.
         """
         form = form_of(self.distribution, self.parameters or {})
         return form.law(self.model_dump(exclude_none=True))
@@ -381,7 +376,7 @@ class RandomInput(NamedInput):
         return self.law.span
 
 
-def _gathered(row: dict[str, Any], unit: str) -> dict[str, Any]:
+def _gathered(row: Content, unit: str) -> Content:
     """The row of a distribution from elsewhere, its own parameters in one table."""
     if "parameters" in row:
         own, kept = row["parameters"], row

@@ -71,10 +71,7 @@ def latin_hypercube(
     Points
         In SI; a variable given as a ratio comes as the inertia it stands for.
 
-    Raises
-    ------
-    InputError
-        If the scene has no study, a name is unknown, or a point makes no mechanism.
+    Raises InputError if the scene has no study, a name is unknown, or a point makes no mechanism.
     """
     study = scene.required_study
     count = _count(study, samples)

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import tomli_w
@@ -15,6 +14,7 @@ from hpcclear.base.units import is_written_in, to_si
 from hpcclear.base.written import Texts, reading, shown, text_of, unit_for
 from hpcclear.scene import describing
 from hpcclear.scene.consistency import ConsistentTables
+from hpcclear.scene.fields import Content
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import curve_at, flatten, replace
 from hpcclear.scene.validation import check_path, scene_of
@@ -27,7 +27,7 @@ class Scene(ConsistentTables):
 
     _text: str = PrivateAttr("")
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """As its content: laws are functions, which are found again where they are needed."""
         return _unpickled, (self.resolved(), self._text, self._readings, self._texts)
 
@@ -112,7 +112,7 @@ class Scene(ConsistentTables):
         same = text and is_written_in(text) and to_si(text, unit, decided=True) == value
         return text if same else value
 
-    def with_(self, changes: Mapping[str, Any] | None = None, /, **more: object) -> "Scene":
+    def with_(self, changes: Mapping[str, object] | None = None, /, **more: object) -> "Scene":
         """A new, validated scene with some entries replaced.
 
         Parameters
@@ -143,9 +143,7 @@ class Scene(ConsistentTables):
         return hash(self.hash)
 
 
-def _unpickled(
-    content: Mapping[str, object], text: str, readings: tuple[str, ...], texts: Texts
-) -> Scene:
+def _unpickled(content: Content, text: str, readings: tuple[str, ...], texts: Texts) -> Scene:
     """A scene from what `Scene.__reduce__` gives."""
     scene = scene_of(Scene, content)
     scene._text, scene._readings, scene._texts = text, readings, texts

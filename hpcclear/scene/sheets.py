@@ -82,10 +82,7 @@ class Sheet:
     def number(self, column: SheetColumn, row: int, unit: str = "", size: Fraction = _ONE) -> float:
         """A cell in SI: `size` times its number, or by the unit that stands with the number in the cell.
 
-        Raises
-        ------
-        InputError
-            If there is none; it names line and column.
+        Raises InputError if there is none; it names line and column.
         """
         cell = column.cells[row]
         text = cell.strip()
@@ -135,10 +132,7 @@ class Sheet:
         The unit of the heading counts, without the g of gauge pressures, else that of a cell, else `default`, "" for SI.
         Clock times are seconds since the first row.
 
-        Raises
-        ------
-        InputError
-            A cell is no number, or a unit is of another quantity; `key` names what the column is read for.
+        Raises InputError: a cell is no number, or a unit is of another quantity; `key` names what the column is read for.
         """
         if unit == "s" and self.is_clock(column):
             return np.array(clock.seconds(column.cells, lambda row: self.place(column, row)))
@@ -160,10 +154,7 @@ class Sheet:
     def entries(self, column: SheetColumn) -> list[float | str]:
         """The cells of a column as entries of a scene: numbers, or texts with the unit of its heading or their own.
 
-        Raises
-        ------
-        InputError
-            If a cell holds no number.
+        Raises InputError if a cell holds no number.
         """
         if column.unit or not all(map(self._has_unit, column.cells)):
             return [
@@ -225,10 +216,7 @@ class Sheet:
     def likely(self, kind: str, unit: str, key: str, taken: Sequence[SheetColumn]) -> SheetColumn:
         """The column of a kind of quantity: the axis, else by its unit, its heading, or because no other is left.
 
-        Raises
-        ------
-        InputError
-            If none or several of them may be meant.
+        Raises InputError if none or several of them may be meant.
         """
         if kind in self.axes:
             return self.axes[kind]
@@ -278,10 +266,7 @@ def read(place: Path, what: str = "table of points", headed: bool = True) -> She
     headed : bool
         Whether headings are needed; else columns without them have the names "1", "2" and so on.
 
-    Raises
-    ------
-    InputError
-        If it is none, or holds what can be read in two ways: the message says what was found, and where.
+    Raises InputError if it is none, or holds what can be read in two ways: the message says what was found, and where.
     """
     path, page = place_of(place)
     collected = gc.isenabled()

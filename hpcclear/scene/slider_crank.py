@@ -5,7 +5,7 @@ Nothing below the scene depends on which template wrote a linkage; `SERIES` and 
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -17,7 +17,17 @@ from hpcclear.scene.driving import (
     PlanarSpeed,
     PlanarTorque,
 )
-from hpcclear.scene.fields import Inertia, Length, Mass, NamedPlace, PositiveLength, Table, invalid
+from hpcclear.scene.effects import EffectTables
+from hpcclear.scene.fields import (
+    Content,
+    Inertia,
+    Length,
+    Mass,
+    NamedPlace,
+    PositiveLength,
+    Table,
+    invalid,
+)
 from hpcclear.scene.joints import (
     Guide,
     IdealPinFriction,
@@ -190,15 +200,18 @@ def path_in_scene(path: str) -> str:
     return path
 
 
-def linkage_of(scene: Any) -> Planar:
-    """The tables of the linkage that a scene's slider-crank is; they are valid since the scene's are."""
-    mechanism, effects = scene.mechanism, scene.effects
+def linkage_of(
+    mechanism: SliderCrank, drive: Drive, joints: CrankJoints, effects: EffectTables
+) -> Planar:
+    """The tables of the linkage that a slider-crank is; they are valid since its own are."""
     bars = [
         PlanarBody.model_construct(name=name, **_entries(bar, Link))
         for name, bar in (("crank", mechanism.crank), ("rod", mechanism.rod))
     ]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
-    turning = {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
+    turning: Content = (
+        {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
+    )
     slider = PlanarBody.model_construct(
         name="slider", mass=mechanism.slider.mass, points=(pin,), **turning
     )
@@ -209,11 +222,11 @@ def linkage_of(scene: Any) -> Planar:
     guide = PlanarSlide.model_construct(
         name="guide", kind="slide", point="slider.pin", line=line,
         friction=effects.guide_friction,
-        **_loose(scene.joints.guide),
+        **({} if joints.guide is None else _entries(joints.guide, Guide) | _materials(joints.guide)),
     )  # fmt: skip
     frame = PlanarRevolute.model_construct(
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o",
-        friction=getattr(scene.joints.crank_frame, "friction", None),
+        friction=getattr(joints.crank_frame, "friction", None),
     )  # fmt: skip
     load = ForceLoad.model_construct(
         name="load", kind="force", place="slider.pin", size=effects.slider_load
@@ -221,37 +234,31 @@ def linkage_of(scene: Any) -> Planar:
     return Planar.model_construct(
         bodies=(*bars, slider),
         ground=ground,
-        joints=(frame, guide, *(_joint(scene, name) for name in JOINTS)),
-        drives=(_drive(scene.drive),),
+        joints=(frame, guide, *(_joint(name, getattr(joints, name)) for name in JOINTS)),
+        drives=(_drive(drive),),
         loads=() if load.size is None else (load,),
     )
 
 
-def _loose(guide: Any) -> dict[str, Any]:
-    """Entries of the slide that a guide with clearance stands for."""
-    return {} if guide is None else _entries(guide, Guide) | {"materials": _materials(guide)}
-
-
-def _entries(table: Any, of: type[Table]) -> dict[str, Any]:
+def _entries(table: Table, of: type[Table]) -> Content:
     """Entries of a table that it has in common with the linkage's."""
     return {name: getattr(table, name) for name in of.model_fields}
 
 
-def _materials(joint: Any) -> Materials:
-    return Materials.model_construct(bearing=joint.bearing, journal=joint.journal)
+def _materials(joint: ClearanceJoint | SliderGuide) -> Content:
+    return {"materials": Materials.model_construct(bearing=joint.bearing, journal=joint.journal)}
 
 
-def _joint(scene: Any, name: str) -> PlanarJoint:
-    joint, (journal, bearing) = getattr(scene.joints, name), JOINTS[name]
-    places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
+def _joint(name: str, joint: ClearanceJoint | IdealJoint) -> PlanarJoint:
+    places: Content = dict(zip(("name", "journal", "bearing"), (name, *JOINTS[name]), strict=True))
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
     return PlanarClearance.model_construct(
-        **places, **_entries(joint, PinInBearing), materials=_materials(joint)
+        **places, **_entries(joint, PinInBearing), **_materials(joint)
     )
 
 
-def _drive(drive: Any) -> PlanarDrive:
+def _drive(drive: Drive) -> PlanarDrive:
     model = PlanarSpeed if isinstance(drive, CrankSpeed) else PlanarTorque
     return model.model_construct(
         name="drive", body="crank", period=True, **_entries(drive, type(drive))

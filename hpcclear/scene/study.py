@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from pydantic import model_validator
 
@@ -276,9 +275,8 @@ class Study(StudyTables):
             _enough(stage, len(group), stage.order, stage.samples, "samples")
         together = len({name for group in self.groups for name in group})
         if together:
-            _enough(
-                stage, together, stage.together_order, stage.together_samples, "together_samples"
-            )
+            order, samples = stage.together_order, stage.together_samples
+            _enough(stage, together, order, samples, "together_samples")
         if self.cases:
             inputs = max(len(model) for model in self.models)
             if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
@@ -290,7 +288,7 @@ class Study(StudyTables):
                 )
 
 
-def _with_paths(row: object, variable: object) -> Any:
+def _with_paths(row: object, variable: object) -> object:
     """A random input with the path or paths of the variable of the same name, unless it has its
     own."""
     if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
@@ -300,7 +298,7 @@ def _with_paths(row: object, variable: object) -> Any:
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
 
 
-def _with_unit(row: object, random: Mapping[str, object]) -> Any:
+def _with_unit(row: object, random: Mapping[str, object]) -> object:
     """A variable that drives a random input with an entry that has the same unit."""
     if not isinstance(row, Mapping) or "like" in row:
         return row

@@ -211,10 +211,7 @@ class StudyTables(Table):
         """Distribution of a random input at a design (SI, by name): of its value where it is absolute, else of its difference
         from the design. What the design leaves out is as in the scene.
 
-        Raises
-        ------
-        InputError
-            Only a wear simulation gives its values.
+        Raises InputError: only a wear simulation gives its values.
         """
         if not self.moves(row):
             return row.law

@@ -5,7 +5,6 @@ An effect that has a cheaper model is there more than once: as a whole, and as w
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
 from hpcclear.scene.curves import Curve
 from hpcclear.scene.driving import CrankTorque, speed_entry
+from hpcclear.scene.fields import Content
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, turns_of
@@ -32,7 +32,7 @@ class Switch:
 
     name: str
     """What goes with it, in words."""
-    changes: Mapping[str, Any]
+    changes: Mapping[str, object]
     """What switches it off: entries to replace; None removes one."""
     moved: Mapping[str, str] = field(default_factory=dict)
     """Numbers that stand elsewhere with the effect off."""
@@ -78,7 +78,7 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        ideal: dict[str, Any] | None
+        ideal: Content | None
         if scene.template is not None:
             ideal = {"kind": "ideal"} if isinstance(joint, PlanarClearance) else None
         elif isinstance(joint, PlanarClearance):
@@ -208,10 +208,7 @@ class Off:
     scene : Scene
         Its study varies what is left; a design variable that drives nothing any more is gone.
 
-    Raises
-    ------
-    InputError
-        Without them the scene is none, or its study has nothing left to vary or to optimise.
+    Raises InputError: without them the scene is none, or its study has nothing left to vary or to optimise.
     """
 
     def __init__(self, scene: Scene, off: Sequence[Switch]) -> None:
@@ -245,10 +242,10 @@ class Off:
         made._text = scene.text
         return made
 
-    def _study(self, scene: Scene, content: Mapping[str, Any]) -> dict[str, Any]:
+    def _study(self, scene: Scene, content: Content) -> Content:
         """The study's table without the paths that are gone, nor names that drive nothing."""
         study = scene.required_study
-        left: dict[str, dict[str, Any]] = {}
+        left: dict[str, Content] = {}
         for table, rows in (("variables", study.variables), ("random", study.random)):
             left[table] = {}
             for row in rows:
@@ -280,7 +277,7 @@ class Off:
         }
 
 
-def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, object]) -> dict[str, Any]:
+def _correlated(table: Content | None, names: Mapping[str, object]) -> Content:
     """The study's correlation among the random inputs that are left, if it has one."""
     rows = [] if table is None else [k for k, name in enumerate(table["inputs"]) if name in names]
     if table is None or len(rows) < 2:
@@ -294,7 +291,7 @@ def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, object]) ->
     }
 
 
-def _named(table: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:
+def _named(table: Content, names: Content) -> Content:
     """A table of a stage without the names of variables that are gone."""
     found = dict(table)
     for key in ("groups", "models"):

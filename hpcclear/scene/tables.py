@@ -14,7 +14,7 @@ from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import NamedRows, Table, nearest
+from hpcclear.scene.fields import Content, NamedRows, Table, nearest
 from hpcclear.scene.joints import Guide, PlanarSlot
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
@@ -24,9 +24,6 @@ from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 from hpcclear.scene.study import Study
 from hpcclear.scene.surfaces import Film, Lives
-
-GUIDE_FRICTION = "effects.guide_friction"
-"""Entry of the friction in a slider-crank's guide."""
 
 Loose = PlanarClearance | PlanarSlide | PlanarSlot
 """Tables of joints that may have clearance."""
@@ -66,13 +63,7 @@ class SceneTables(Table):
 
     @property
     def required_study(self) -> Study:
-        """The study of a scene that needs one.
-
-        Raises
-        ------
-        InputError
-            If it has none.
-        """
+        """The study of a scene that needs one; raises InputError if it has none."""
         if self.study is None:
             remedy = "Add [study] and [study.variables], as in jobs/quickstart.toml"
             raise InputError("study", None, "the scene has no study", remedy)
@@ -189,10 +180,12 @@ class SceneTables(Table):
     @property
     def linkage(self) -> Planar:
         """The mechanism by bodies, joints, drives and loads, as the scene has it or its template writes it."""
-        if isinstance(self.mechanism, Planar):
-            return self.mechanism
+        mechanism = self.mechanism
+        if isinstance(mechanism, Planar):
+            return mechanism
         if self._linkage is None:
-            self._linkage = slider_crank.linkage_of(self)
+            tables = self.drive, self.joints, self.effects
+            self._linkage = slider_crank.linkage_of(mechanism, *tables)
         return self._linkage
 
     def path_in_linkage(self, path: str) -> str:
@@ -257,7 +250,7 @@ class SceneTables(Table):
             if (rubs := getattr(one, "friction", None)) is not None:
                 kind = "guide" if isinstance(one, Guide) else "pin"
                 key = self.path_in_scene(f"mechanism.joints.{one.name}.friction")
-                where = "" if key == GUIDE_FRICTION else f" in {one.name}"
+                where = "" if key == "effects.guide_friction" else f" in {one.name}"
                 found[key] = f"{kind} friction{where}", rubs.coefficient
         return found
 
@@ -291,10 +284,10 @@ class SceneTables(Table):
             self._known_hash = hashlib.sha256(content.encode()).hexdigest()
         return self._known_hash
 
-    def resolved(self) -> dict[str, Any]:
+    def resolved(self) -> Content:
         """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
         in."""
-        content: dict[str, Any] = plain(self)
+        content: Content = plain(self)
         # A name's own paths are left out, so that C follows when a joint is made ideal.
         open_paths = [f"{self.joint_key(name)}.clearance" for name in self.clearance_joints()]
         for table in ("variables", "random"):
@@ -310,13 +303,7 @@ class SceneTables(Table):
         return tuple(self._numbers())
 
     def number(self, path: str) -> float:
-        """The physical number at a dotted path, SI.
-
-        Raises
-        ------
-        InputError
-            If the scene has no number there.
-        """
+        """The physical number at a dotted path, SI; raises InputError if the scene has no number there."""
         numbers = self._numbers()
         if path not in numbers:
             raise InputError(
@@ -327,10 +314,7 @@ class SceneTables(Table):
     def baseline(self, name: str) -> float:
         """Where the scene itself is in the column of a study variable: its number, SI, or the row of its table.
 
-        Raises
-        ------
-        InputError
-            The scene's own numbers are not among its rows.
+        Raises InputError: the scene's own numbers are not among its rows.
         """
         study = self.required_study
         variable = study.variable(name)

@@ -12,7 +12,7 @@ from hpcclear.base.units import factor, is_written_in, noting
 from hpcclear.base.written import reading
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
-from hpcclear.scene.fields import Table, hint, invalid, nearest
+from hpcclear.scene.fields import Content, Table, hint, invalid, nearest
 from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
@@ -54,10 +54,7 @@ def check_path(path: object) -> None:
 def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
     """Tables as a model of its kind.
 
-    Raises
-    ------
-    InputError
-        If it is not valid: the first thing to mend, with key, value, reason and remedy.
+    Raises InputError if it is not valid: the first thing to mend, with key, value, reason and remedy.
     """
     _check_depth(content)
     try:
@@ -68,9 +65,7 @@ def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
         raise _translated(details[0], content, more=len(details) - 1) from None
 
 
-def scene_of(
-    kind: type[Whole], content: Mapping[str, Any], before: SceneTables | None = None
-) -> Whole:
+def scene_of(kind: type[Whole], content: Content, before: SceneTables | None = None) -> Whole:
     """The scene of a file's tables, with the readings of its units; errors as `validated`.
 
     `before`: the scene that was changed, whose numbers stay as they were written.
@@ -221,22 +216,18 @@ def _check_corner(
 
 
 def _check_depth(content: Mapping[str, object]) -> None:
-    level: list[Any] = [content]
+    level: list[object] = [content]
     for _ in range(DEEPEST):
         level = [
             inner
             for outer in level
-            for inner in (outer.values() if isinstance(outer, Mapping) else outer)
+            for inner in (outer.values() if isinstance(outer, Mapping) else outer)  # type: ignore[attr-defined]
             if isinstance(inner, (Mapping, list, tuple))
         ]
         if not level:
             return
-    raise InputError(
-        "scene",
-        "...",
-        "is nested too deeply",
-        f"Nest at most {DEEPEST} levels of tables and arrays",
-    )
+    remedy = f"Nest at most {DEEPEST} levels of tables and arrays"
+    raise InputError("scene", "...", "is nested too deeply", remedy)
 
 
 def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
@@ -292,12 +283,8 @@ def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ..
     in_rows = len(location) > 2 and location[0] in _TAGGED_ROWS and isinstance(location[1], int)
     if in_rows and not kind.startswith("union_tag"):
         return location[:2] + location[3:]
-    for prefix in _TAGGED:
-        if (
-            location[: len(prefix)] == prefix
-            and len(location) > len(prefix)
-            and not kind.startswith("union_tag")
-        ):
+    for prefix in () if kind.startswith("union_tag") else _TAGGED:
+        if location[: len(prefix)] == prefix:
             return prefix + location[len(prefix) + 1 :]
     return location
 
@@ -336,8 +323,7 @@ def _explained(error: ErrorDetails, found: object, path: str) -> tuple[str, str]
                 remedy = hint(found) + nearest(found, words)
             return "is not one of the known values", remedy
         case "union_tag_not_found":
-            table = path.removesuffix(".kind")
-            table = table.removeprefix("mechanism.")
+            table = path.removesuffix(".kind").removeprefix("mechanism.")
             kinds = _KINDS.get(table) or _KINDS[table.partition(".")[0]]
             return "is missing", f"Add kind = {kinds}"
         case "bool_type":
@@ -347,6 +333,5 @@ def _explained(error: ErrorDetails, found: object, path: str) -> tuple[str, str]
         case "missing" | "too_short" | "too_long" | "tuple_type":
             return "a list of the right length is expected here", "Write it as [first, second]"
         case _:
-            return error["msg"][:1].lower() + error["msg"][
-                1:
-            ], "See the scene reference in the documentation"
+            message = error["msg"][:1].lower() + error["msg"][1:]
+            return message, "See the scene reference in the documentation"

@@ -1,20 +1,22 @@
 """Study variables: which numbers of a scene a design chooses, and what they may be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import PrivateAttr, model_validator
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import at
 from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, CatalogueRow, Cost
-from hpcclear.scene.fields import Bounds, Number, Numbers, Quantity, invalid
+from hpcclear.scene.fields import Bounds, Content, Number, Numbers, Quantity, invalid
 from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities
 
 LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
+"""Entries that scale with m L^2/12."""
 
 
 class StudyVariable(NamedInput):
@@ -59,7 +61,7 @@ class StudyVariable(NamedInput):
             self._check_rows(self.catalogue)
 
     @staticmethod
-    def _without_numbers(data: Mapping[str, object]) -> Mapping[str, Any]:
+    def _without_numbers(data: Mapping[str, object]) -> Mapping[str, object]:
         """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
         if "catalogue" in data and "path" not in data:
             return {**data, "paths": texts_in(data.get("paths"))}
@@ -115,7 +117,7 @@ class StudyVariable(NamedInput):
         if kind in ("fits", "catalogue"):
             return cls._of_rows(row, kind, paths)
         if kind == "ratio":
-            if len(paths) != 1 or not is_link_inertia(paths[0]):
+            if len(paths) != 1 or paths[0] not in LINK_INERTIAS:
                 raise invalid(
                     "only the inertia of crank or rod can be given as a ratio to m L^2/12",
                     "Write range = [lower, upper] instead",
@@ -146,7 +148,7 @@ class StudyVariable(NamedInput):
         return row
 
     @classmethod
-    def _of_rows(cls, row: dict[str, Any], kind: str, paths: tuple[str, ...]) -> dict[str, Any]:
+    def _of_rows(cls, row: Content, kind: str, paths: tuple[str, ...]) -> Content:
         if not isinstance(row[kind], (list, tuple)):
             raise invalid("a list is expected here", "Write it in [ ]", kind)
         if paths:
@@ -264,7 +266,7 @@ class StudyVariable(NamedInput):
         own = self.rows[int(value)].entries if self.rows else {}
         return {path: own.get(path, value) for path in self.input_paths}
 
-    def costs(self, values: Any) -> Any:
+    def costs(self, values: Array | float) -> Array | float:
         """What designs cost by its column, a number or (n,); 0 where it says nothing."""
         if self.cost is not None:
             return self.cost.of(values, self.options)
@@ -316,7 +318,7 @@ class StudyVariable(NamedInput):
 _KINDS = ("range", "ratio", "values", "fits", "catalogue")
 
 
-def _of_input(row: Mapping[str, Any]) -> Quantity:
+def _of_input(row: Content) -> Quantity:
     """Unit and bounds of a variable that drives entries of random inputs."""
     entries = {choices.input_entry(path)[1] for path in row.get("follows") or ()}
     if len({OF_INPUT[entry] for entry in entries}) > 1:
@@ -327,14 +329,9 @@ def _of_input(row: Mapping[str, Any]) -> Quantity:
     return Quantity(unit) if signed else Quantity(unit, above=0)
 
 
-def _same_length(cost: Any, options: Any) -> None:
+def _same_length(cost: Sequence[object], options: Sequence[object]) -> None:
     """An error for validators unless there is a cost for each option."""
     if len(cost) != len(options):
         raise invalid(
             f"{len(cost)} costs for {len(options)} options", "Give each option a cost", "cost"
         )
-
-
-def is_link_inertia(path: str) -> bool:
-    """Whether the path is the inertia of crank or rod, which scales with m L^2/12."""
-    return path in LINK_INERTIAS

@@ -45,11 +45,8 @@ class _Enough(Exception):
 def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> Rows:
     """Numbers and cells of the rows of a sheet that are not empty.
 
-    Raises
-    ------
-    InputError
-        If the file is too large or damaged, several sheets hold something and none is named, or a cell is a formula
-        without a stored value, or merged with others.
+    Raises InputError if the file is too large or damaged, several sheets hold something and none is named, or a cell is a
+    formula without a stored value, or merged with others.
     """
     if len(data) > LARGEST:
         raise InputError(what, str(path), f"is larger than {LARGEST} bytes", "Save it as CSV")
@@ -291,7 +288,7 @@ class _Page:
             tag = _local(tag)
         if tag == "c":
             letters = attributes.get("r", "").rstrip("0123456789")
-            self.column = _column(letters) if letters else self.column + 1
+            self.column = _place(f"{letters}1")[1] if letters else self.column + 1
             self.elements += 1
             if self.column > MOST_COLUMNS or self.elements > 2 * MOST_CELLS:
                 self.book.refuse(f"has more than {MOST_CELLS} cells or {MOST_COLUMNS} columns")
@@ -382,6 +379,7 @@ class _Page:
 _PLACE = re.compile(r"\$?([A-Z]{1,3})\$?([0-9]{1,7})")
 
 
+@lru_cache(MOST_COLUMNS)
 def _place(reference: str) -> tuple[int, int]:
     """Row and column, from 1 on, of a reference such as C5."""
     found = _PLACE.fullmatch(reference)
@@ -391,11 +389,6 @@ def _place(reference: str) -> tuple[int, int]:
     for letter in found[1]:
         column = 26 * column + ord(letter) - 64
     return int(found[2]), column
-
-
-@lru_cache(MOST_COLUMNS)
-def _column(letters: str) -> int:
-    return _place(f"{letters}1")[1]
 
 
 def _letters(column: int) -> str:

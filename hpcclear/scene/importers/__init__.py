@@ -6,10 +6,11 @@ in `FORMATS`.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hpcclear.base.errors import at, content_of
 from hpcclear.base.units import to_si
+from hpcclear.scene.fields import Content
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
 from hpcclear.scene.importers.file import File
 from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
@@ -60,10 +61,7 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
         Of lengths, where the file states none. One that contradicts the file is refused; of a drawing it is used and noted,
         since drawings often state the unit of a template.
 
-    Raises
-    ------
-    InputError
-        If no format fits the file, or the file has parts that a scene cannot have.
+    Raises InputError if no format fits the file, or the file has parts that a scene cannot have.
     """
     if unit:
         with at("--unit", unit):
@@ -74,6 +72,6 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
     return found.drawing_of(File(path, data, unit, found.again))
 
 
-def linkage_of(path: Path, unit: str = "") -> dict[str, Any]:
+def linkage_of(path: Path, unit: str = "") -> Content:
     """The tables of a scene whose linkage has its points where a file has them; see `drawing_of`."""
     return scene_of(drawing_of(path, unit), str(path))

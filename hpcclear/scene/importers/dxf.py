@@ -102,7 +102,8 @@ def drawing_of(file: File) -> Drawing:
             "has no points, lines, circles or polylines",
             "Draw the sketch in the model space",
         )
-    extent = _extent(every)
+    low = tuple(min(place[k] for place in every) for k in (0, 1))
+    extent = max(math.dist(place, low) for place in every)
     places, at = _distinct(every, extent, file)
     lines = sum(len(body.lines) for body in bodies.values())
     if max(len(places), len(bodies)) > MOST_POINTS or lines > MOST_LINES:
@@ -120,12 +121,6 @@ def drawing_of(file: File) -> Drawing:
         one._replace(x=round(scale * one.x, 12), y=round(scale * one.y, 12)) for one in points
     ]
     return Drawing([one for one in points if one.bodies != (GROUND,)], {}, [*notes, *left])
-
-
-def _extent(places: Sequence[Place]) -> float:
-    """Largest distance of places from the lower left corner of them all."""
-    low = tuple(min(place[k] for place in places) for k in (0, 1))
-    return max(math.dist(place, low) for place in places)
 
 
 def _read(file: File) -> tuple[int, list[_Entity]]:
@@ -196,10 +191,9 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
                 one.text(2)[:40], "the drawing has a block", "Explode blocks, and save it again"
             )
         if one.text(67).strip() == "1" or layer.lower() == "defpoints" or one.kind not in _READ:
-            where = " of the paper space" if one.text(67).strip() == "1" else ""
-            left[
-                f"{one.kind[:40]}{where or ' of the layer Defpoints' * (layer.lower() == 'defpoints')}"
-            ] += 1
+            where = " of the layer Defpoints" if layer.lower() == "defpoints" else ""
+            where = " of the paper space" if one.text(67).strip() == "1" else where
+            left[f"{one.kind[:40]}{where}"] += 1
             continue
         if one.text(230).startswith("-"):
             file.refuse(
@@ -220,7 +214,9 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
         else:
             bars += 1
             name = f"bar{bars}"
-        left["bulge of a polyline, which is read as a straight line"] += _bulges(one, file)
+        left["bulge of a polyline, which is read as a straight line"] += sum(
+            file.number(value, "a bulge") != 0.0 for code, value in one.pairs if code == 42
+        )
         _add(bodies.setdefault(name, _Body()), one, file)
     if not bodies[GROUND].points:
         file.refuse(
@@ -240,11 +236,6 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
         if counted:
             notes.append(f"{words}: {listed(counted)}")
     return bodies, [*notes, *given.notes()]
-
-
-def _bulges(one: _Entity, file: File) -> int:
-    """How many sides of a polyline are arcs."""
-    return sum(file.number(value, "a bulge") != 0.0 for code, value in one.pairs if code == 42)
 
 
 def _add(body: _Body, one: _Entity, file: File) -> None:

@@ -113,10 +113,7 @@ class File(NamedTuple):
         where : str
             Where it would, in errors.
 
-        Raises
-        ------
-        InputError
-            If neither the file nor the user says a unit, or they contradict each other.
+        Raises InputError if neither the file nor the user says a unit, or they contradict each other.
         """
         given = to_si(f"1 {self.unit}", "m") if self.unit else stated
         if given is None:

@@ -4,12 +4,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import tomli_w
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import written
+from hpcclear.scene.fields import Content
 from hpcclear.scene.importers.file import GROUND, limit, listed
 
 MASS = 0.1
@@ -49,7 +50,7 @@ class Drawing(NamedTuple):
     """What the file has and the scene does not, and what to check."""
 
 
-def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
+def scene_of(drawing: Drawing, key: str) -> Content:
     """The tables of a scene whose linkage has its points where a drawing has them.
 
     Parameters
@@ -58,10 +59,7 @@ def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
     key : str
         The file, in errors.
 
-    Raises
-    ------
-    InputError
-        If the bodies make no linkage.
+    Raises InputError if the bodies make no linkage.
     """
     points = _with_blocks(_checked(drawing.points, key), key)
     own = _by_body(points)
@@ -82,7 +80,7 @@ def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> str:
+def text_of(content: Content, source: str, notes: Sequence[str] = ()) -> str:
     """The scene file: the tables, and what to put in below a heading."""
     lines = [
         f"A linkage with the points of {' '.join(source.split())}.",
@@ -95,9 +93,9 @@ def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> 
     return "\n".join(f"# {line}" for line in lines) + "\n\n" + tomli_w.dumps(content)
 
 
-def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
+def _drives(speeds: Mapping[str, float]) -> Content:
     """A drive for each body; where one turn of the slowest is not enough for all to repeat, its turns until they do."""
-    made: dict[str, Any] = {
+    made: Content = {
         "motor" if len(speeds) == 1 else f"motor_{body}": {
             "kind": "constant-speed", "body": body, "speed": written(float(f"{speed:.12g}"), "rpm"),
         }
@@ -112,7 +110,7 @@ def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
     return made
 
 
-def _repeating(drives: Mapping[str, Mapping[str, Any]]) -> str:
+def _repeating(drives: Mapping[str, Content]) -> str:
     """After how many turns several drives repeat together, in words."""
     main = next((row for row in drives.values() if row.get("period")), None)
     if main is None:
@@ -124,7 +122,7 @@ def _repeating(drives: Mapping[str, Mapping[str, Any]]) -> str:
     return f"; they repeat together after {main.get('turns', 1)} turns of {main['body']}, which is one revolution of the scene"
 
 
-def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str]]:
+def summary(content: Content, drawing: Drawing) -> list[tuple[str, str]]:
     """Return what a scene has of a file, and what it leaves, as labels and texts."""
     mechanism = content["mechanism"]
     drives = [f"{row['body']} at {row['speed']}" for row in mechanism["drives"].values()]
@@ -255,7 +253,7 @@ def _frame(name: str, own: Sequence[DrawnPoint], key: str) -> _Frame:
     return _Frame(first.x, first.y, math.atan2(second.y - first.y, second.x - first.x))
 
 
-def _body(own: Sequence[DrawnPoint], frame: _Frame, size: float) -> dict[str, Any]:
+def _body(own: Sequence[DrawnPoint], frame: _Frame, size: float) -> Content:
     """Its table; a body of one point is as long as a tenth of the linkage."""
     places = {one.name: frame.local(one) for one in own}
     centre = [round(sum(place[k] for place in places.values()) / len(places), 12) for k in (0, 1)]
@@ -273,9 +271,9 @@ def _degrees(angle: float) -> str:
     return f"{0.0 + round(math.degrees(angle), 9)!r} deg"
 
 
-def _joints(points: Sequence[DrawnPoint], frames: Mapping[str, _Frame]) -> dict[str, Any]:
+def _joints(points: Sequence[DrawnPoint], frames: Mapping[str, _Frame]) -> Content:
     """A pin for each further body of a point; a guide where a point slides."""
-    made: dict[str, Any] = {}
+    made: Content = {}
     taken = {one.name for one in points}
     for one in points:
         if one.slide is not None:

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import hinges
 from hpcclear.scene.curves import Curve, Pairs
 from hpcclear.scene.fields import Quantity
@@ -39,10 +40,12 @@ class CylinderLoad(Load):
         """The force, if it is a table."""
         return {self.name: self.force} if isinstance(self.force, tuple) else {}
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, Array | float]:
         """Its damping, and its force or where the table of it bends."""
         found = super().numbers()
-        return found | hinges(self.name, self.force) if isinstance(self.force, tuple) else found
+        for name, rows in self.straight.items():
+            found.update(hinges(name, rows))
+        return found
 
     def act(self, on: Any) -> Any:
         """Opposite forces along the line of both places."""

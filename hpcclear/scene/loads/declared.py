@@ -5,7 +5,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hpcclear.base.pieces import Pieces, level, periodic
+from hpcclear.base.arrays import Array
+from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.fields import Table, invalid
 
 
@@ -28,7 +29,7 @@ class Load(Table):
         """Its tables that run straight from row to row (`Acting.piecewise`), by the names that their parameters begin with."""
         return {}
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, Array | float]:
         """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
         entries = {entry: getattr(self, entry) for entry in type(self).model_fields}
         return {
@@ -58,12 +59,12 @@ class SizedLoad(Load):
     """Another body against whose angle the table is read; it repeats with each turn of that body."""
 
     @property
-    def constant(self) -> Any:
+    def constant(self) -> float:
         """Its size; 1 where a curve has it."""
         return 1.0 if self.table else getattr(self, self.size_entry)
 
     @property
-    def timed(self) -> Any:
+    def timed(self) -> Rows | None:
         """Rows of its curve over the time; None where there is none."""
         return getattr(self, f"{self.size_entry}_by_time")
 
@@ -92,9 +93,11 @@ class SizedLoad(Load):
         if self.angle_of is not None and not isinstance(size, tuple):
             reason = f"there is no table of {entry} against an angle"
             raise invalid(reason, "Remove it", key="angle_of", value=self.angle_of)
-        if self.repeats and timed is None:
+        if not self.repeats:
+            return
+        if timed is None:
             raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
-        if self.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+        if timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]:
             raise invalid(
                 "a table that repeats begins at 0 s, and ends at the value with which it begins",
                 "Make its first and last value equal",

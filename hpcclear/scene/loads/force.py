@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import Angle, PairTable, Quantity, check_one_of
@@ -45,7 +46,7 @@ class ForceLoad(SizedLoad):
         size = self.size if self.size is not None else self.size_by_time
         check_one_of("force", force, size, "Write force = [x, y], or size and direction")
 
-    def components(self) -> tuple[Any, Any]:
+    def components(self) -> tuple[Array | float, Array | float]:
         """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""
         if self.force is not None:
             return self.force.x, self.force.y
@@ -56,7 +57,7 @@ class ForceLoad(SizedLoad):
         )
         return self.constant * cosine, self.constant * sine
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, Array | float]:
         """Its components."""
         x, y = self.components()
         return {f"{self.name}_force_x": x, f"{self.name}_force_y": y}

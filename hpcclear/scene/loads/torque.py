@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import check_one_of
@@ -27,7 +28,7 @@ class TorqueLoad(SizedLoad):
         remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
         check_one_of("torque", self.torque, self.torque_by_time, remedy)
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, Array | float]:
         """Its size."""
         return {f"{self.name}_torque": self.constant}
 
