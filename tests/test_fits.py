@@ -265,7 +265,7 @@ def test_a_random_clearance_by_the_fit_of_its_joint():
         ({"fit": "20 H7/f7", "bore": {"cp": 1, "cpk": 1.2, "towards": "upper"}}, "larger than cp"),
         ({"fit": "20 H7/f7", "pin": {"cp": 1.33, "cpk": 1.0}}, 'towards = "upper" or "lower"'),
         ({"fit": "20 H7/f7", "pin": {"distribution": "uniform", "cp": 1.33}}, "belongs to a normal"),
-        ({"fit": "20 H7/f7", "pin": {"range": ["20 mm", "19 mm"]}}, "do not rise"),
+        ({"fit": "20 H7/f7", "pin": {"range": ["20 mm", "19 mm"]}}, "are crossed"),
         ({"fit": "20 H7/f7", "pin": {"capability": 1}}, "is not a known key"),
         ({"fit": "20 H7/f7", "path": "mechanism.rod.mass"}, "clearances of joints only"),
     ],

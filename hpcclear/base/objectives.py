@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import FIELDS, IMPACTS, LEVELS, RESPONSES, WIDEST
+from hpcclear.base.outcome import FIELDS, IMPACTS, RESPONSES, WIDEST
 
 Function = Callable[..., Array | float]
 
@@ -119,16 +119,6 @@ class Objective:
     def unit_of_rate(self) -> str:
         """Unit of what is made of the rate."""
         return self.unit if self.rate_unit is None else self.rate_unit
-
-    @property
-    def needs_responses(self) -> bool:
-        """Whether samples have to record more than gaps and peak forces for it."""
-        return not self.asks.isdisjoint(RESPONSES)
-
-    @property
-    def needs_impacts(self) -> bool:
-        """Whether samples have to record measures of impact and noise for it."""
-        return not self.asks.isdisjoint((*IMPACTS, *LEVELS))
 
     def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
         """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak

@@ -75,12 +75,10 @@ def refusal(folder: Path) -> str:
         user = host.user_number()
         if not stat.S_ISDIR(about.st_mode) or user not in (None, about.st_uid):
             return "is not a directory of yours"
-        if user is None:  # native Windows: the directory of temporary files is the user's own
-            why = _unwritable(folder)
-            return f"cannot be written to ({why})" if why else ""
-        if about.st_mode & 0o077:
+        # on native Windows the directory of temporary files is the user's own
+        if user is not None and about.st_mode & 0o077:
             return "is open to others (chmod 700 mends that)"
-        for parent in folder.resolve().parents:
+        for parent in () if user is None else folder.resolve().parents:
             if _exchangeable(parent.stat()):
                 return f"can be exchanged by whoever may write to {parent}"
     except OSError as error:

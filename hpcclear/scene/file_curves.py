@@ -172,7 +172,10 @@ def _column(
 ) -> tuple[SheetColumn, Array]:  # fmt: skip
     """The column of a kind, and its numbers in SI, shape (n,)."""
     key = f"{key}.{kind}"
-    name, unit = ("", "") if given is None else _named(given, target)
+    # such as "bar", "cylinder 1" or "cylinder 1 [bar]"
+    name, unit = (
+        ("", given or "") if given is None or fits(given, target) else parsed_heading(given)
+    )
     column = sheet.column(name, key) if name else sheet.likely(kind, target, key, taken)
     if unit and column.unit and _size(unit, target, key) != _size(column.unit, target, key):
         raise InputError(
@@ -191,24 +194,13 @@ def _size(unit: str, target: str, key: str) -> Fraction:
         return factor(plain_unit(unit, target), target)
 
 
-def _named(given: str, target: str) -> tuple[str, str]:
-    """Heading and unit of an entry such as "bar", "cylinder 1" or "cylinder 1 [bar]"."""
-    return ("", given) if fits(given, target) else parsed_heading(given)
-
-
 def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key: str) -> Array:
     gauge = plain_unit(column.unit, "Pa") != column.unit
     if gauge and curve.ambient:
         raise InputError(
             f"{key}.ambient", curve.ambient, f"the heading {column.heading!r} is of gauge pressures", 'Write ambient = "0 bar"'
         )  # fmt: skip
-    if curve.piston is None:
-        raise InputError(
-            f"{key}.bore",
-            None,
-            "is missing: pressures push on a piston",
-            'Add bore = "42 mm", or area',
-        )
+    assert curve.piston is not None  # by validation
     if curve.ambient is None and not gauge:
         raise InputError(
             f"{key}.ambient", None, "is missing: nothing says whether these are absolute or gauge pressures",
@@ -216,12 +208,8 @@ def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key
         )  # fmt: skip
     on_slider = key == "effects.slider_load"
     if curve.pushes is not None and not on_slider:
-        raise InputError(
-            f"{key}.pushes",
-            curve.pushes,
-            "belongs to the load on a slider",
-            "Write direction of this load",
-        )
+        reason, remedy = "belongs to the load on a slider", "Write direction of this load"
+        raise InputError(f"{key}.pushes", curve.pushes, reason, remedy)
     sign = -1.0 if on_slider and curve.pushes != "+x" else 1.0
     found: Array = sign * curve.piston * (values - (curve.ambient or 0.0))
     return found
@@ -248,11 +236,8 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
     span = angles[-1] - angles[0]
     if span > 2 * TURN * (1 + 1e-6):
         reason = f"goes over {math.degrees(span):.6g} deg, more than two turns"
-        raise InputError(
-            *where,
-            reason,
-            "Give one turn, or the two of a four-stroke engine; average cycles first",
-        )
+        remedy = "Give one turn, or the two of a four-stroke engine; average cycles first"
+        raise InputError(*where, reason, remedy)
     turns = 1 if span <= TURN * (1 + 1e-6) else 2
     step = float(np.median(np.diff(angles)))
     gaps = np.append(np.diff(angles), max(turns * TURN - span, 0.0))

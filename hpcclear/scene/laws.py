@@ -131,10 +131,6 @@ class LawTable(Table):
     law: str
     _law: Law | None = PrivateAttr(None)
 
-    @classmethod
-    def _own(cls) -> tuple[str, ...]:
-        return tuple(cls.model_fields)
-
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, given: object) -> object:
@@ -149,7 +145,10 @@ class LawTable(Table):
             return data
         law = cls.find(name, data)
         cls._refuse_unknown(data, law)
-        return {**{k: v for k, v in data.items() if k in cls._own()}, **cls._converted(data, law)}
+        return {
+            **{k: v for k, v in data.items() if k in cls.model_fields},
+            **cls._converted(data, law),
+        }
 
     @classmethod
     def find(cls, name: str, data: Mapping[str, object]) -> Law:
@@ -199,7 +198,7 @@ class LawTable(Table):
         others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
         entries = {} if law is None else {p.name: p for p in law.parameters}
         for key in data:
-            if key in cls._own() or key in entries or (law is None and key in others):
+            if key in cls.model_fields or key in entries or (law is None and key in others):
                 continue
             if law is not None and law.name == "none" and key in others:
                 raise invalid(
@@ -216,7 +215,7 @@ class LawTable(Table):
                 whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
                 raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
             raise invalid(
-                "is not a known key", hint(key) + nearest(key, (*cls._own(), *entries)), key
+                "is not a known key", hint(key) + nearest(key, (*cls.model_fields, *entries)), key
             )
 
     @classmethod
@@ -225,7 +224,7 @@ class LawTable(Table):
         found = dict[str, object]()
         theirs = law.name not in laws(cls.kind)
         for parameter in law.parameters:
-            if parameter.name in cls._own():
+            if parameter.name in cls.model_fields:
                 reason = f"{law.name} has a parameter {parameter.name!r}, which is an entry of every law's table"
                 raise invalid(reason, "Give the parameter another name", "law", law.name)
             value = data.get(parameter.name, parameter.default)
@@ -253,7 +252,7 @@ class LawTable(Table):
         return found
 
     def _check(self) -> None:
-        given = {name: getattr(self, name) for name in self._own()}
+        given = {name: getattr(self, name) for name in type(self).model_fields}
         self._law = type(self).find(self.law, given)
 
     def values(self) -> dict[str, Any]:

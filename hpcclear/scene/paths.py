@@ -120,45 +120,40 @@ def _general(path: object) -> str:
     return ".".join(parts)
 
 
-class Quantities(dict[str, Quantity]):
+class Quantities(Mapping[str, Quantity]):
     """By path; the rows of a linkage have names of their own, so theirs are kept by "mechanism.bodies.*.mass"."""
 
-    of_kind: dict[str, dict[str, Quantity]]
-    """Those that differ from kind to kind of a row, by path and kind."""
+    def __init__(self, own: Mapping[str, Mapping[str, Quantity]]) -> None:
+        self._own = own  # by path and kind of the row, "" for any other
+
+    def _of(self, path: object) -> Quantity | None:
+        """Of an entry that all scenes have alike."""
+        kinds = self._own.get(str(path)) or self._own.get(_general(path))
+        row = str(path).rpartition(".")[0]
+        kind = _kinds.get().get(row) or _SEEN.get(row, "")
+        return None if kinds is None else kinds.get(kind, kinds[""])
 
     def __contains__(self, path: object) -> bool:
-        general = _general(path)
-        return any(path in known for known in (dict.keys(self), ENTRIES)) or general in dict.keys(
-            self
-        )
+        return path in ENTRIES or self._of(path) is not None
 
     def __getitem__(self, path: str) -> Quantity:
         """Return the quantity; raises InputError where laws that were read have it in several units."""
-        found = dict(ENTRIES.get(path, {}))
-        if not found:
-            return super().__getitem__(path)
-        if dict.__contains__(self, path):
-            ours = dict.__getitem__(self, path)
+        found, ours = dict(ENTRIES.get(path, {})), self._of(path)
+        if ours is not None:
             found[ours.unit] = ours
+        if not found:
+            raise KeyError(path)
         if len(found) > 1:
             listed = " and ".join(unit or "no unit" for unit in sorted(found))
             reason = f"laws that were read here have a parameter of this name in {listed}, so its unit is not known"
             raise InputError(path, path, reason, "Give one of the parameters another name")
         return next(iter(found.values()))
 
-    def __missing__(self, path: str) -> Quantity:
-        general = _general(path)
-        if general == path:
-            raise KeyError(path)
-        if general in self.of_kind:
-            row = path.rpartition(".")[0]
-            kind = _kinds.get().get(row) or _SEEN.get(row, "")
-            return self.of_kind[general].get(kind) or dict.__getitem__(self, general)
-        return dict.__getitem__(self, general)
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._own)
 
-    def get(self, path: str, default: object = None) -> Any:
-        """The quantity at a path, or `default`."""
-        return self[path] if path in self else default  # noqa: SIM401 - get() is this
+    def __len__(self) -> int:
+        return len(self._own)
 
 
 _NAMED = ("bodies", "joints", "drives", "loads", "points")
@@ -167,15 +162,13 @@ _NAMED = ("bodies", "joints", "drives", "loads", "points")
 @lru_cache(maxsize=1)
 def quantities() -> Mapping[str, Quantity]:
     """Every path of a physical number that some scene may have, with its unit and bounds."""
-    found, of_kind = Quantities(), dict[str, dict[str, Quantity]]()
+    found = dict[str, dict[str, Quantity]]()
     for path, field, kinds in _all_entries():
         if (quantity := _quantity(field)) is not None:
-            found[path] = quantity
-            of_kind.setdefault(path, {}).update(dict.fromkeys(kinds, quantity))
-    found.of_kind = {path: rows for path, rows in of_kind.items() if len(set(rows.values())) > 1}
+            found.setdefault(path, {}).update(dict.fromkeys((*kinds, ""), quantity))
     for kind in ("contact", "friction"):
-        found |= dict(law_entries(kind))
-    return found
+        found |= {path: {"": quantity} for path, quantity in law_entries(kind)}
+    return Quantities(found)
 
 
 _WORDS = {

@@ -1,6 +1,8 @@
 """Designs to simulate: arrays with a name and scene entries for each column, their check, and users' tables of them."""
 
+import itertools
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -246,19 +248,13 @@ def read_points(path: str | Path, scene: Scene) -> Points:
         else:
             columns.append(found)
     if not columns:
-        raise InputError(
-            key,
-            ", ".join(sheet.names),
-            "no column has numbers of this scene",
-            "Name one such as m2 [g]",
-        )
+        reason = "no column has numbers of this scene"
+        raise InputError(key, ", ".join(sheet.names), reason, "Name one such as m2 [g]")
     names, paths = tuple(c.column.name for c in columns), tuple(c.paths for c in columns)
-    driven = [path for column in paths for path in column]
-    for path_ in driven:
-        if driven.count(path_) > 1:
-            raise InputError(
-                key, ", ".join(names), f"two columns drive {path_}", "Remove one of them"
-            )
+    twice = [path for path, count in Counter(itertools.chain(*paths)).items() if count > 1]
+    if twice:
+        reason = f"two columns drive {twice[0]}"
+        raise InputError(key, ", ".join(names), reason, "Remove one of them")
     values = np.column_stack([column.read(sheet) for column in columns])
     named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
     points = Points(names, values, paths, named if labels else ())

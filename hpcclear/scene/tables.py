@@ -2,13 +2,14 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field, PrivateAttr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
+from hpcclear.base.outcome import IMPACTS, LEVELS, RESPONSES
 from hpcclear.base.written import Texts, reading, shown
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
@@ -91,18 +92,20 @@ class SceneTables(Table):
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: requested, or required by the study."""
-        asked = self.numerics.responses or any(one.needs_responses for one in self._objectives())
-        return asked or self.impacts_asked()
+        return self.numerics.responses or self._asks_any(RESPONSES) or self.impacts_asked()
 
     def impacts_asked(self) -> bool:
         """Whether each sample records measures of impact and noise: ``numerics.impacts``, or what the study requires of it."""
-        asked = self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
-        return asked or bool(self.bands())
+        return self.numerics.impacts or self._asks_any((*IMPACTS, *LEVELS)) or bool(self.bands())
 
     def bands(self) -> tuple[float, ...]:
         """Middles of the third-octave bands whose levels each sample records, Hz: requested, or required by the study."""
         asked = {band_of(one) for one in self.numerics.levels}
         return tuple(sorted(asked | {one.band for one in self._objectives()} - {0.0}))
+
+    def _asks_any(self, fields: Iterable[str]) -> bool:
+        """Whether an objective or response of the study needs one of some fields of a record."""
+        return any(not one.asks.isdisjoint(fields) for one in self._objectives())
 
     def _objectives(self) -> list[Objective]:
         """The objective, and the further responses of the study."""

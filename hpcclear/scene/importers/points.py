@@ -135,23 +135,16 @@ def summary(content: Content, drawing: Drawing) -> list[tuple[str, str]]:
          for name, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)),
         default=None,
     )  # fmt: skip
+    stated = "" if drawing.speeds else ", a placeholder: the file states no drive"
     lines = [
         ("bodies", listed(mechanism["bodies"])),
         ("joints", listed(kinds)),
-        (
-            "drives",
-            listed(drives)
-            + ("" if drawing.speeds else ", a placeholder: the file states no drive")
-            + _repeating(mechanism["drives"]),
-        ),
+        ("drives", listed(drives) + stated + _repeating(mechanism["drives"])),
     ]
     if length is not None:
-        lines.append(
-            (
-                "length",
-                f"at most {1e3 * length[0]:.6g} mm, from {length[2]} to {length[3]} of {length[1]}",
-            )
-        )
+        size, body, first, second = length
+        text = f"at most {1e3 * size:.6g} mm, from {first} to {second} of {body}"
+        lines.append(("length", text))
     return lines + [("note", note) for note in drawing.notes]
 
 
@@ -174,19 +167,15 @@ def _driven(points: Sequence[DrawnPoint], names: Sequence[str], key: str) -> str
     for name in names:
         if name in pinned:
             return name
-    still = any(
-        GROUND in (*one.bodies, one.guide if one.slide is not None else "") for one in points
-    )
-    if still:
-        reason, remedy = (
-            "the file states no drive, and no body turns about a pin of the ground",
-            "Drive a crank on the ground",
-        )
-    else:
-        reason, remedy = (
-            "no body is pinned to the ground",
-            'Name the body "ground" at points that stand still',
-        )
+    reason = "the file states no drive, and no body turns about a pin of the ground"
+    remedy = "Drive a crank on the ground"
+    slides = (one for one in points if one.slide is not None)
+    if GROUND not in {
+        *(name for one in points for name in one.bodies),
+        *(one.guide for one in slides),
+    }:
+        reason = "no body is pinned to the ground"
+        remedy = 'Name the body "ground" at points that stand still'
     raise InputError(key, listed(names), reason, remedy)
 
 

@@ -2,24 +2,11 @@
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
-
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import hinges
 from hpcclear.scene.curves import Curve, Pairs
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.loads.declared import Load
-
-
-def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
-    """Direction, length and rate of the length of an offset."""
-    square = (
-        ex * ex + ey * ey + 1e-300
-    )  # keeps the direction of an offset without length defined (and zero)
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    return nx, ny, square * inverse, vx * nx + vy * ny
+from hpcclear.scene.loads.declared import Load, along
 
 
 class CylinderLoad(Load):

@@ -3,11 +3,21 @@
 import math
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.fields import Table, invalid
+
+
+def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
+    """Direction, length and rate of the length of an offset; without length its direction is defined, and zero."""
+    square = ex * ex + ey * ey + 1e-300
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    return nx, ny, square * inverse, vx * nx + vy * ny
 
 
 class Load(Table):

@@ -5,48 +5,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.loads.declared import Load
+from hpcclear.scene.loads.declared import Load, along
 
 
-def spring_force(
-    stiffness: float, damping: float, length: float, ex: float, ey: float, vx: float, vy: float
-) -> tuple[float, float, float]:
-    """Force of a spring and damper on its first place, whose offset and velocity from the second are given.
-
-    Returns both components in N, and the power that both ends are given in W (what it stores and loses, negative).
-    """
-    square = (
-        ex * ex + ey * ey + 1e-300
-    )  # keeps the direction of a spring without length defined (and zero)
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    rate = vx * nx + vy * ny
-    tension = stiffness * (square * inverse - length) + damping * rate
-    return -tension * nx, -tension * ny, -tension * rate
-
-
-def one_sided(
-    side: float,
-    stiffness: float,
-    damping: float,
-    length: float,
-    ex: float,
-    ey: float,
-    vx: float,
-    vy: float,
-) -> tuple[float, float, float]:
-    """The same of a spring that acts on one side of its length: beyond it (`side` 1) or within it (-1); it never pulls back."""
-    square = ex * ex + ey * ey + 1e-300
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    rate = vx * nx + vy * ny
-    beyond = side * (square * inverse - length)
-    size = stiffness * beyond + damping * side * rate
+def one_sided(side: float, stiffness: float, damping: float, beyond: float, rate: float) -> float:
+    """Tension, N, of a spring that acts beyond its length (`side` 1) or within it (-1) alone, and never against itself."""
+    size = stiffness * (side * beyond) + damping * side * rate
     size = 0.5 * (size + abs(size))
-    tension = side * size * (0.5 + 0.5 * np.sign(beyond))
-    return -tension * nx, -tension * ny, -tension * rate
+    return side * size * (0.5 + 0.5 * np.sign(side * beyond))
 
 
 class SpringLoad(Load):
@@ -70,13 +36,15 @@ class SpringLoad(Load):
     def act(self, on: Any) -> Any:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
-        entries = ("stiffness", "damping", "length")
-        terms = (*map(on.parameter, entries), *apart, *moving)
-        made = ("fx", "fy", "power")
-        if self.acts == "both":
-            fx, fy, power = on.call(spring_force, *terms, results=made)
-        else:
+        made = ("nx", "ny", "length", "rate")
+        nx, ny, length, rate = on.call(along, *apart, *moving, results=made)
+        stiffness, damping = on.parameter("stiffness"), on.parameter("damping")
+        beyond = length - on.parameter("length")
+        tension = stiffness * beyond + damping * rate
+        if self.acts != "both":
             side = -on.one if self.acts == "pushing" else on.one
-            fx, fy, power = on.call(one_sided, side, *terms, results=made)
-        on.push_apart(self.first, self.second, fx, fy)
-        return power
+            terms = side, stiffness, damping, beyond, rate
+            (tension,) = on.call(one_sided, *terms, results=("tension",))
+        tension = on.let(f"tension_{self.name}", tension)
+        on.push_apart(self.first, self.second, -tension * nx, -tension * ny)
+        return -tension * rate
