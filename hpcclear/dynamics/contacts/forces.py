@@ -6,7 +6,6 @@ contact's place (`layout.Joint`).
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.friction import ratio_of, sides_of
 from hpcclear.dynamics.physics.friction import share_of
 
 
@@ -33,6 +32,36 @@ def normal_force(effects, work, par, joint, depth, rate, i, W):
     row = joint.block + at.CONTACT_NUMBERS
     normal = effects.contact.force(par, row, depth, rate, inverse_impact, active, i, W)
     return switched(effects.latched, normal, active)
+
+
+@lane_function
+def ratio_of(effects, work, par, joint, sliding, normal, i, W):
+    """Tangential over normal force (N) of a joint's surfaces that slide at so many m/s; 0 without friction.
+
+    Bristles have a coordinate of their own, whose velocity is the deflection and whose acceleration its rate.
+    That goes by the sliding speed alone, in contact or not.
+    """
+    row = joint.block + at.FRICTION_NUMBERS
+    if effects.bristled is not None:
+        number = joint.place - effects.first
+        deflection = work[(at.VS + number) * W + i]
+        rate = effects.friction.deflection(par, row, sliding, normal, deflection, 0.0, i, W)
+        work[(at.ACC + number) * W + i] = rate
+        return effects.friction.ratio(par, row, sliding, normal, deflection, rate, i, W)
+    elif effects.friction is not None:
+        return effects.friction.ratio(par, row, sliding, normal, 0.0, 0.0, i, W)
+    else:
+        return 0.0
+
+
+@lane_function
+def sides_of(law, par, row, sliding, i, W):
+    """Functions of the sliding speed that vanish where friction's ramp begins and ends; 0 without."""
+    if law is not None:
+        low = law.low(par, row, sliding, 0.0, 0.0, 0.0, i, W)
+        return low, law.high(par, row, sliding, 0.0, 0.0, 0.0, i, W)
+    else:
+        return 0.0, 0.0
 
 
 @lane_function
@@ -73,8 +102,9 @@ def store_impacts(effects, work, par, joint, touch, normal, i, W):
 
 
 @lane_function
-def store_contact(effects, work, par, joint, touch, forces, direction, i, W):
-    """Write down what effects require of a contact; `touch` and `forces` as of `lost`, `direction`: of the normal."""
+def store_contact(effects, work, par, joint, felt, i, W):
+    """Write down what effects require of a contact; `felt`: touch and forces as of `lost`, direction of the normal."""
+    touch, forces, direction = felt
     _, rate, sliding = touch
     normal, tangential = forces
     nx, ny = direction

@@ -53,7 +53,7 @@ def corner_force(effects, work, par, joint, relative, across, i, W):
     loss = lost(effects, work, par, joint, touch, forces, i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = normal
-    store_contact(effects, work, par, joint, touch, forces, across, i, W)
+    store_contact(effects, work, par, joint, (touch, forces, across), i, W)
     return (
         normal * nx - product(rubs, tangential, ny),
         normal * ny + product(rubs, tangential, nx),

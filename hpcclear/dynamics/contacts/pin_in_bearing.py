@@ -71,7 +71,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     whole = pressed(effects.film_at[joint.place], normal, nx, ny, oil[0], oil[1])
     work[(at.RATE_NOW + joint.force) * W + i] = whole
-    store_contact(effects, work, par, joint, touch, forces, (nx, ny), i, W)
+    store_contact(effects, work, par, joint, (touch, forces, (nx, ny)), i, W)
     store_angles(effects, work, joint, here, i, W)
     return (
         fx + oil[0] + side[0],

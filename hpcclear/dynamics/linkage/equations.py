@@ -24,7 +24,7 @@ RESERVED = (
 """Names that a text has already, and that a value of a load or drive must not hide."""
 
 
-class Equations:
+class MotionEquations:
     """Forces, mass matrix and constraints of a mechanism, and their solution, term by term.
 
     Attributes

@@ -149,10 +149,6 @@ class Writer:
         """A parameter of the sample."""
         return named(name, fixed=True)
 
-    def has(self, name: str) -> bool:
-        """Whether a parameter has been given a row."""
-        return name in self.rows
-
     def when_needed(self, names: tuple[str, ...], line: str, needs: tuple[Term, ...] = ()) -> None:
         """A statement that defines `names`, written down before the first that uses one of them."""
         for name in names:

@@ -12,7 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.acting import Acting
 from hpcclear.dynamics.linkage.closing import dot
 from hpcclear.dynamics.linkage.drives import Drive, Release, RunUp, TorqueDrive, straight_of
-from hpcclear.dynamics.linkage.equations import Equations
+from hpcclear.dynamics.linkage.equations import MotionEquations
 from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
@@ -63,7 +63,7 @@ def generate(
     return _Generator(mechanism, on, rows, cartesian, hoist).motion()
 
 
-class _Generator(Equations):
+class _Generator(MotionEquations):
     """Writes a whole motion: equations, and what effects and outputs ask for besides."""
 
     def motion(self) -> Motion:

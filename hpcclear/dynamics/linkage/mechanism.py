@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-import numpy as np
-
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.drives import (
@@ -136,11 +134,13 @@ def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> lis
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
     for joint in mechanism.joints if kinds is object else mechanism.ideal:
         if isinstance(joint, kinds):
-            names = {split(place)[0] for place in joint.places}
-            touched = [group for group in groups if group & names]
-            groups = [group for group in groups if not group & names]
-            groups.append(set().union(*touched))
+            groups = _merged(groups, {split(place)[0] for place in joint.places})
     return sorted(groups, key=lambda group: GROUND not in group)
+
+
+def _merged(groups: list[set[str]], names: set[str]) -> list[set[str]]:
+    apart = [group for group in groups if not group & names]
+    return [*apart, set().union(*(group for group in groups if group & names))]
 
 
 def _records(m: Mechanism) -> Iterator[tuple[str, Any]]:
@@ -212,9 +212,7 @@ def coupled(m: Mechanism) -> list[set[str]]:
     groups = joined(m, (Slide, Fixed))
     for load in m.loads:
         if load.by_angle and (other := getattr(load, "other", None)):
-            touched = [names for names in groups if names & {load.body, other}]  # type: ignore[attr-defined]
-            rest = [names for names in groups if not names & {load.body, other}]  # type: ignore[attr-defined]
-            groups = [set().union(*touched), *rest]
+            groups = _merged(groups, {str(getattr(load, "body", "")), other})
     return sorted(groups, key=lambda names: GROUND not in names)
 
 
@@ -294,8 +292,7 @@ def massless_angles(m: Mechanism) -> set[str]:
                 if body not in found or carrier in found:
                     continue
                 if isinstance(joint, Revolute):
-                    aside = np.subtract(m.body(body).points[here], m.body(body).center)
-                    held = bool(np.abs(aside).max() > 0.0)
+                    held = tuple(m.body(body).points[here]) != tuple(m.body(body).center)
                 else:
                     held = isinstance(joint, (Slide, Fixed))
                 found -= {body} if held else set()

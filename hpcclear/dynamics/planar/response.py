@@ -50,7 +50,8 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
     gravity = scene.effects.gravity
     kinetic, potential, _ = linkage.energies(par, seen.q.T, seen.v.T, seen.turn_time, gravity)
     joints = list(scene.open_places)
-    active = contacts_on(scene, seen.contacts)
+    latched = scene.effects.contact is not None and scene.effects.contact.latched
+    active = seen.contacts[:, joints] if latched else np.ones((len(seen.contacts), len(joints)))
     gaps = seen.rates.gap[:, joints]
     elastic = stored_energy(scene, par, gaps, active, joints)
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
@@ -70,6 +71,12 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
     }
     frame = {"frame_force_x": seen.rates.frame_x, "frame_force_y": seen.rates.frame_y}
     frame = frame if joints and not scene.modes else {}
+    modal, pins = {}, {}
+    if modes := scene.modes:
+        modal = {"mode_amplitude": seen.q[:, :modes], "mode_velocity": seen.v[:, :modes]}
+        modal["strain_energy"] = strain
+    elif count := len(pins_of(mechanism)):  # where a bar bends they are not known
+        pins = {f"pin_force_{axis}": seen.pins[:, k, :count] for k, axis in enumerate("xy")}
     held = {}
     if linkage.cartesian:
         held["constraint_violation"] = violation(linkage, seen.q.T, seen.v.T, seen.turn_time)
@@ -79,22 +86,16 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
         "crank_moment": seen.rates.drive_moment,
         **frame,
         **balance_series(stored, seen.works),
-        **mode_series(scene.modes, seen.q, seen.v, strain),
+        **modal,
         **guide_series(mechanism, pose),
         **held,
-        **({} if scene.modes else pin_series(mechanism, seen.pins)),
+        **pins,
     }
 
 
 def pins_of(mechanism: Mechanism) -> tuple[str, ...]:
     """Names of the pins without clearance."""
     return tuple(joint.name for joint in mechanism.joints if type(joint) is Revolute)
-
-
-def pin_series(mechanism: Mechanism, pins: Array) -> dict[str, Array]:
-    """Forces of the ideal pins on their journals' bodies (t, pins); where a bar bends they are not known."""
-    count = len(pins_of(mechanism))
-    return {f"pin_force_{axis}": pins[:, k, :count] for k, axis in enumerate("xy") if count}
 
 
 def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> list[str]:
@@ -137,7 +138,9 @@ def moved(
     clearance : bool
         As `path.followed` takes it.
     """
-    drive = driven(mechanism, places, phase)
+    k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
+    angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
+    drive = {"crank_angle": angle, "crank_speed": speed, "drive_phase": phase}
     if scene.template is None:
         return {**drive, **places, **followed(scene, phase, places, acceleration, clearance)}
     names = [body.name for body in mechanism.bodies]
@@ -184,17 +187,6 @@ def balance_series(
     }
 
 
-def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Array]:
-    """Series of the modes of bending, of coordinates (t, n) that begin with theirs; none without."""
-    if not modes:
-        return {}
-    return {
-        "mode_amplitude": q[:, :modes],
-        "mode_velocity": v[:, :modes],
-        "strain_energy": strain,
-    }
-
-
 def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
     guides = [joint for joint in mechanism.clearances if isinstance(joint, (LooseSlide, LooseSlot))]
@@ -218,23 +210,6 @@ def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Number]:
     k = [body.name for body in mechanism.bodies].index(name)
     arm = as_complex(mechanism.at(place)) - as_complex(mechanism.bodies[k].center)
     return pose.x[k] + 1j * pose.y[k] + arm * np.exp(1j * pose.angle[k]), pose.angle[k]
-
-
-def contacts_on(scene: Scene, contacts: Array) -> Array:
-    """Whether a penetration of each open joint counts, (t, joints): under `latched` laws only while in contact."""
-    latched = scene.effects.contact is not None and scene.effects.contact.latched
-    joints = list(scene.open_places)
-    return contacts[:, joints] if latched else np.ones((len(contacts), len(joints)))
-
-
-def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> dict[str, Array]:
-    """Return the series (t,) of the body that gives the period: its angle and speed, and the progress of the drive, rad.
-
-    `places`: as `bodies_and_points` has them; `phase` (t,): that progress.
-    """
-    k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
-    angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
-    return {"crank_angle": angle, "crank_speed": speed, "drive_phase": phase}
 
 
 def _phase(scene: Scene, linkage: Linkage, par: Array, seen: ResponseStates) -> Array:
