@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
+def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     """Designs from a mapping of name or scene path to values, shape (n,) or a scalar, SI.
 
     Raises
@@ -63,7 +63,7 @@ def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
     return (name,)
 
 
-def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Dataset:
+def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Dataset:
     """Simulate many designs of a scene in this process.
 
     Parameters

@@ -6,14 +6,15 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
 from hpcclear.ensemble.maps import grid, number_of, run_map
-from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.session import Finished, Options
 from hpcclear.ensemble.wear import run_wear
 from hpcclear.ranks.boundary import alone
-from hpcclear.results.content import Results
+from hpcclear.ranks.progress import Style
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
@@ -31,12 +32,11 @@ def _place(output: str | Path | None) -> Iterator[Path]:
 
 
 def in_process(
-    run: Callable[[Path, Any, Any], Any], output: str | Path | None, progress: Any
+    run: Callable[[Path, Ranks, Options], Finished], output: str | Path | None, progress: str
 ) -> xr.Dataset:
     """What a command writes, carried out in this process: `run` gets the place, this process, and options."""
     with _place(output) as place:
-        content: Results = run(place, alone(), Options(style=progress)).content
-    return content.to_xarray()
+        return run(place, alone(), Options(style=cast(Style, progress))).content.to_xarray()
 
 
 def map(

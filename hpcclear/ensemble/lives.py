@@ -1,7 +1,6 @@
 """Service lives as a dataset: curves and their quantiles, profiles, survival, main causes, and warnings."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -80,7 +79,7 @@ def lives_dataset(
     over = at_end >= (1.0 - 1e-6) * local_bounds(joints, limits)
     at_end[[not (one.reason or one.status.valid) for one in lives]] = np.nan
     values = _curves(found, len(cycles), len(scene.joint_labels))
-    data: dict[str, Any] = {
+    data: dict[str, np.ndarray] = {
         **values,
         **_of_lives(lives),
         "lifetime": ends,
@@ -100,7 +99,7 @@ def lives_dataset(
     names = () if inputs is None else inputs.names
     if inputs is not None:
         data |= {name: inputs.column(name) for name in names}
-    coords: dict[str, Any] = {
+    coords: dict[str, np.ndarray] = {
         "life": np.arange(len(lives)), "joint": np.array(scene.worn_joints(), dtype=str),
         "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
         "random_input": np.array(names, dtype=str),

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ TOGETHER = 8
 
 def responses_of(
     scene: Scene,
-    variants: Sequence[Mapping[str, Any]],
+    variants: Sequence[Mapping[str, object]],
     evaluate: Callable[[Scene, Results], Array],
     shape: tuple[int, ...],
     ranks: Ranks,
@@ -69,13 +69,7 @@ def responses_of(
         The disk refuses a checkpoint.
     """
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
-    payload = {
-        "scene": content_of(scene),
-        "variants": list(variants),
-        "evaluate": evaluate,
-        "dtype": dtype,
-        "together": together,
-    }
+    payload = ResponsesPayload(content_of(scene), variants, evaluate, dtype, together)
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
     task = Task(stage, Responses, payload, dtype)
     if checkpoint is None:
@@ -122,13 +116,22 @@ class _Keeper:
             self._saved_at, self._new = time.monotonic(), False
 
 
+class ResponsesPayload(NamedTuple):
+    """What a rank needs to know of responses, as `responses_of` has it."""
+
+    content: dict[str, Any]
+    variants: Sequence[Mapping[str, object]]
+    evaluate: Callable[[Scene, Results], Array]
+    dtype: np.dtype
+    together: int
+
+
 class Responses:
     """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
 
-    def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
-        self._scene = load_scene(payload["scene"], trust=True)
-        self._variants, self._evaluate = payload["variants"], payload["evaluate"]
-        self._dtype, self._together = payload["dtype"], payload["together"]
+    def __init__(self, payload: ResponsesPayload, ranks: Ranks) -> None:
+        content, self._variants, self._evaluate, self._dtype, self._together = payload
+        self._scene = load_scene(content, trust=True)
         # as many under way, and one in stock: who hands out may be at one of its own
         self.lanes = 1 + self._together
         self._queue: list[tuple[int, int, int]] = []

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -152,12 +151,12 @@ def identified(
     inputs = ensemble.inputs
     units = [one.unit for one in inputs.unknowns]
     limit = settings.limit_in(units[0])
-    coords: dict[str, Any] = {
+    coords: dict[str, np.ndarray] = {
         "unknown": np.array([one.name for one in inputs.unknowns], str),
         "input": np.array(inputs.names, str),
         "end": np.array(["lower", "median", "upper"], str),
     }
-    data: dict[str, Any] = {
+    data: dict[str, np.ndarray] = {
         "unit": np.array(units, str),
         "prior_lower": np.array([one.lower for one in inputs.unknowns]),
         "prior_upper": np.array([one.upper for one in inputs.unknowns]),
@@ -192,7 +191,7 @@ def identified(
 
 def _of_records(
     found: Found, particles: Array, features: Sequence[str], unknowns: int
-) -> dict[str, Any]:
+) -> dict[str, np.ndarray]:
     """Variables over the records; NaN where a record lacks a feature of another."""
     verdicts = [verdict for _, verdict in found]
     places = [[features.index(label) for label in made.labels] for made, _ in found]

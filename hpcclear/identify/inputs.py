@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -135,7 +134,7 @@ class Inputs:
         paths = (*(one.paths for one in self.unknowns), *(one.paths for one in self.nuisances))
         return Points(self.names, self.values(places), paths)
 
-    def variants(self, places: Array) -> list[dict[str, Any]]:
+    def variants(self, places: Array) -> list[dict[str, float]]:
         """Return the entries of the scene at each of the places (n, size or more)."""
         points = self.points(places)
         return [

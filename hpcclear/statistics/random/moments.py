@@ -17,7 +17,6 @@ is still a product over the groups.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -176,8 +175,8 @@ class RobustObjective:
         """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
         designs = self._checked(designs)
         leaf = self.model.leaves[0]
-        simple = isinstance(leaf, Kriging) and self.model.separable
-        if not simple or self._wiring.derived or self._joint is not None:
+        simple = self.model.separable and self._joint is None and not self._wiring.derived
+        if not (isinstance(leaf, Kriging) and simple):
             raise InputError(
                 "model",
                 self.model.names,
@@ -233,7 +232,7 @@ class RobustObjective:
             own = {n: one[k : k + step] if len(one) > 1 else one for n, one in draws.items()}
             yield self._wiring.places(dims, designs[k : k + step], own)
 
-    def _closed(self, leaf: Any, design: np.ndarray) -> tuple[float, float]:
+    def _closed(self, leaf: Kriging, design: np.ndarray) -> tuple[float, float]:
         wiring = self._wiring
         weights = leaf.scale * leaf.signal_variance * leaf.alpha
         lengths = leaf.length_scales * (leaf.upper - leaf.lower)

@@ -1,15 +1,14 @@
 """Kriging models fitted by maximum likelihood (`likelihood`); sources: `kriging`."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
-from hpcclear.statistics.surrogate.likelihood import maximise
+from hpcclear.statistics.surrogate.likelihood import Fitted, maximise
 
 LENGTH_BOUNDS = (1e-2, 1e2)
 """Length scales in the unit cube; over 1e-5 to 1e5 noisy fits can collapse."""
@@ -103,12 +102,10 @@ def fit_kriging(
     found = _maximise_likelihood(
         unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel, noise or NOISE_BOUNDS
     )
-    samples: dict[str, Any] = {
-        "inputs": inputs,
-        "values": values[valid],
-        "dropped": int((~valid).sum()),
-    }
-    return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples, kernel=kernel)
+    return Kriging(
+        labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs,
+        values=values[valid], dropped=int((~valid).sum()), kernel=kernel,
+    )  # fmt: skip
 
 
 def _maximise_likelihood(
@@ -119,8 +116,8 @@ def _maximise_likelihood(
     lengths: tuple[float, float],
     kernel: Kernel,
     noise: tuple[float, float],
-) -> dict[str, Any]:
-    """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
+) -> Fitted:
+    """Length scales, variances and alpha, of normalised data in the unit cube."""
     from threadpoolctl import threadpool_limits
 
     dims = unit.shape[1]
@@ -129,5 +126,4 @@ def _maximise_likelihood(
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = maximise(unit, normalised, start, bounds, restarts, seed, kernel=kernel)
-    return asdict(found)
+        return maximise(unit, normalised, start, bounds, restarts, seed, kernel=kernel)
