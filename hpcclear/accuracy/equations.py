@@ -11,7 +11,7 @@ from hpcclear.dynamics.linkage.observe import derivative, new_seen
 from hpcclear.dynamics.stepping.problem import Problem
 
 
-class Equations:
+class CalledEquations:
     """The equations of one design, for solvers that call them.
 
     Parameters
@@ -33,14 +33,10 @@ class Equations:
         self.size = effects.first + effects.joints  # places of joints whose gaps are integrated
         self.start = np.concatenate([start.state(n), np.zeros(self.size)])
         self.contacts = start.contacts.copy()
-        self._origin = start
+        self.origin = start
         self.calls = 0
         self._head = problem.motion(problem.effects, 1).address, problem.tables
         self._seen = new_seen(n, par, self.size)
-
-    def anew(self) -> "Equations":
-        """The same design at its start."""
-        return Equations(self.problem, self.par, self._origin)
 
     def __call__(self, time: float, y: Array) -> Array:
         """dy/dt, shape (2 n + joints,)."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from hpcclear.accuracy.equations import Equations
+from hpcclear.accuracy.equations import CalledEquations
 from hpcclear.accuracy.looked_at import QUANTITIES, end_of, neighbours
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -108,13 +108,13 @@ def _kernel_outcome(
 # ---- methods that are not the kernel's ----------------------------------------------------------
 
 
-def systems(scene: Scene, designs: int) -> list[Equations]:
+def systems(scene: Scene, designs: int) -> list[CalledEquations]:
     """The equations of the designs in minimal coordinates."""
     here = one_turn(scene, formulation="minimal", method="auto")
     problem = problem_of(here)
     par = parameters(here, neighbours(here, designs))
     start = start_states(here, par)
-    return [Equations(problem, own, start[k]) for k, own in enumerate(par)]
+    return [CalledEquations(problem, own, start[k]) for k, own in enumerate(par)]
 
 
 def outside_method(scene: Scene, designs: int, name: str) -> Integrator:
@@ -135,7 +135,7 @@ def outside_method(scene: Scene, designs: int, name: str) -> Integrator:
 
 
 def _values(
-    scene: Scene, one: Equations, y: Array, duration: float, peak: float
+    scene: Scene, one: CalledEquations, y: Array, duration: float, peak: float
 ) -> tuple[float, float, float, float]:
     n = one.n
     f = float(objective(y[2 * n :])) / duration
@@ -144,10 +144,11 @@ def _values(
 
 
 def solve_turn(
-    scene: Scene, one: Equations, solver: str, rtol: float
+    scene: Scene, one: CalledEquations, solver: str, rtol: float
 ) -> tuple[tuple[float, ...], int]:
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
-    here, start, period = one.anew(), one.start.copy(), float(one.named.period)
+    here = CalledEquations(one.problem, one.par, one.origin)  # at its start
+    start, period = one.start.copy(), float(one.named.period)
     effects = one.problem.effects
     joints = list(at.places_of(effects))
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
@@ -184,7 +185,7 @@ def solve_turn(
     return (np.nan,) * 4, count
 
 
-def _crossing(one: Equations, joint: int, side: float, at_start: float) -> Event:
+def _crossing(one: CalledEquations, joint: int, side: float, at_start: float) -> Event:
     """The event that a gap leaves its side of zero; right after the last event it is taken to be on it."""
     shift = 2.0 * at_start if side * at_start < 0.0 else 0.0
     return _event(lambda time, y: float(one.joints(time, y)[joint, OPEN]) - shift, -side)
@@ -211,7 +212,7 @@ def _event(value: Event, direction: float) -> Event:
     return event
 
 
-def _largest_force(one: Equations, piece: object) -> float:
+def _largest_force(one: CalledEquations, piece: object) -> float:
     """Largest contact force of a piece, by its dense output about the largest step end."""
     times, states, dense = piece.t, piece.y.T, piece.sol  # type: ignore[attr-defined]
     forces = np.array(
