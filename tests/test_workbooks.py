@@ -237,3 +237,13 @@ def test_numbers_of_a_workbook_say_nothing_of_the_signs_in_its_texts(texts, expe
         first, second = values()
         assert list(first) == [1.125, 0.5]
         assert list(second) == expected
+
+
+def test_hidden_rows_and_columns_are_read_and_named(tmp_path, capsys):
+    hidden = CELLS.replace('<row r="2">', '<row r="2" hidden="1">')
+    columns = '<cols><col min="2" max="16384" hidden="1"/></cols>'
+    place = tmp_path / "hidden.xlsx"
+    place.write_bytes(book(hidden, columns))
+    assert read(place, "file").columns[1].name == "a"
+    note = f"Note: rows 2 and columns B of {place} are hidden, and are read like the others"
+    assert note in capsys.readouterr().err

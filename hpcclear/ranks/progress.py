@@ -15,6 +15,7 @@ Style = Literal["auto", "bar", "log", "quiet"]
 
 _LAUNCHERS = ("mpiexec", "mpirun", "prterun", "orterun")
 _BAR_INTERVAL = 0.2  # s
+SIGN_OF_LIFE = 300.0  # s, after which a line of a log is repeated though nothing was finished
 _WINDOW = 30.0  # s, over which the rate is taken: costs change over a design
 
 
@@ -53,7 +54,8 @@ class Progress:
     def start(self, total: int, completed: np.ndarray) -> None:
         """Begin with `total` samples, of which the records `completed` are there already."""
         self._total, self._done, self._failed = total, completed.size, _failures(completed)
-        self._began = self._shown = self._clock()
+        self._began = self._shown = self._written = self._clock()
+        self._counted = (-1, -1)  # samples and failures of the last line of a log
         self._origin = (self._began, self._done)
         self._history = deque([self._origin])
         if self._style == "auto":
@@ -81,10 +83,12 @@ class Progress:
         self._history.append((now, self._done))
         while len(self._history) > 2 and now - self._history[1][0] >= _WINDOW:
             self._history.popleft()
-        if self._bar is None:
-            self._write(f"{self.text()}, {self._eta()}")
-        else:
+        counted = (self._done, self._failed)
+        if self._bar is not None:
             self._draw()
+        elif counted != self._counted or now - self._written >= SIGN_OF_LIFE:
+            self._counted, self._written = counted, now
+            self._write(f"{self.text()}, {self._eta()}")
 
     def close(self) -> None:
         """Show the final state, with the rate over all."""

@@ -7,19 +7,19 @@ readers keep a cell for each place of a range, and every text. What only Excel c
 import datetime
 import io
 import posixpath
-import re
 import zipfile
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator
-from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 from xml.parsers import expat
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.remarks import remark
 from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows, Stored
+from hpcclear.scene.references import letters, place
 
 LARGEST = LARGEST_FILE // 4
 """Bytes of a workbook, which is packed."""
@@ -59,6 +59,8 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> Rows:
         reason = f"is no Excel workbook that can be read ({type(error).__name__}: {error})"
         raise InputError(what, str(path), reason[:300], "Save it anew as .xlsx or CSV") from error
     page.refuse_merged()
+    if hidden := page.hidden():
+        remark(f"Note: {hidden} of {path} are hidden, and are read like the others")
     return [(row, cells) for row, cells in page.rows.items() if any(cells)]
 
 
@@ -275,6 +277,7 @@ class _Page:
         self.book = book
         self.rows: dict[int, list[str]] = {}
         self.merged = list[tuple[str, int]]()
+        self._hidden_rows, self._hidden_columns = list[int](), list[int]()
         self.row = self.column = self.elements = self.kept = 0
         self.kind = self.style = ""
         self.value: str | None = None
@@ -287,8 +290,8 @@ class _Page:
         if ":" in tag:
             tag = _local(tag)
         if tag == "c":
-            letters = attributes.get("r", "").rstrip("0123456789")
-            self.column = _place(f"{letters}1")[1] if letters else self.column + 1
+            name = attributes.get("r", "").rstrip("0123456789")
+            self.column = place(f"{name}1")[1] if name else self.column + 1
             self.elements += 1
             if self.column > MOST_COLUMNS or self.elements > 2 * MOST_CELLS:
                 self.book.refuse(f"has more than {MOST_CELLS} cells or {MOST_COLUMNS} columns")
@@ -299,6 +302,11 @@ class _Page:
             self.row, self.column = int(number) if number else last + 1, 0
             if not last < self.row <= MOST_ROWS:
                 self.book.refuse(f"has more than {MOST_ROWS} rows, or rows in disorder")
+            if attributes.get("hidden") in ("1", "true"):
+                self._hidden_rows.append(self.row)
+        elif tag == "col" and attributes.get("hidden") in ("1", "true"):
+            last = min(int(attributes["max"]), MOST_COLUMNS)
+            self._hidden_columns += range(int(attributes["min"]), last + 1)
         elif tag == "mergeCell":
             self._merge(attributes.get("ref", ""))
         else:
@@ -338,7 +346,7 @@ class _Page:
         raw, formats = (self.value or "").strip(), self.book.formats
         if self.formula is not None and not raw and (self.value is None or self.kind != "str"):
             raise InputError(
-                f"{self.book.path}, cell {_letters(self.column)}{self.row}", f"={self.formula}"[:80],
+                f"{self.book.path}, cell {letters(self.column)}{self.row}", f"={self.formula}"[:80],
                 "is a formula without a stored value",
                 "Open and save the file in a spreadsheet program, or write the number",
             )  # fmt: skip
@@ -358,11 +366,24 @@ class _Page:
 
     def _merge(self, reference: str) -> None:
         first, _, last = reference.partition(":")
-        (row, begin), (_, end) = _place(first), _place(last or first)
+        (row, begin), (_, end) = place(first), place(last or first)
         if begin < end:
             if len(self.merged) >= MOST_CELLS // 10:
                 self.book.refuse("has too many merged cells")
             self.merged.append((reference, row))
+
+    def hidden(self) -> str:
+        """Rows and columns with cells that are not shown, in words; "" for none."""
+        width = max(map(len, self.rows.values()), default=0)
+        own = {
+            "rows": [str(row) for row in self._hidden_rows if row in self.rows],
+            "columns": [letters(one) for one in self._hidden_columns if one <= width],
+        }
+        return " and ".join(
+            f"{kind} {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}"
+            for kind, names in own.items()
+            if names
+        )
 
     def refuse_merged(self) -> None:
         """InputError where a row with several filled cells has merged ones; a title may be merged."""
@@ -374,26 +395,3 @@ class _Page:
                     "the cells are merged, so it is open which column they head",
                     "Split them, and give each column a heading of its own",
                 )  # fmt: skip
-
-
-_PLACE = re.compile(r"\$?([A-Z]{1,3})\$?([0-9]{1,7})")
-
-
-@lru_cache(MOST_COLUMNS)
-def _place(reference: str) -> tuple[int, int]:
-    """Row and column, from 1 on, of a reference such as C5."""
-    found = _PLACE.fullmatch(reference)
-    if found is None:
-        raise ValueError(f"{reference[:20]!r} is no cell")
-    column = 0
-    for letter in found[1]:
-        column = 26 * column + ord(letter) - 64
-    return int(found[2]), column
-
-
-def _letters(column: int) -> str:
-    made = ""
-    while column:
-        column, rest = divmod(column - 1, 26)
-        made = chr(65 + rest) + made
-    return made
