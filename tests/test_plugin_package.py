@@ -148,7 +148,7 @@ def test_distribution_surrogate_and_search_of_a_package_make_a_study(
 
 
 def test_all_of_them_are_listed_with_their_package(package):
-    done = CliRunner().invoke(cli, ["show", "laws"])
+    done = CliRunner().invoke(cli, ["show", "laws", "--details"])
     assert done.exit_code == 0, done.output
     for name, _ in OFFERED.values():
         assert name in done.output

@@ -382,7 +382,7 @@ def test_samples_with_a_user_s_law_are_the_same_on_two_ranks(tmp_path):
 
 
 def test_laws_are_listed_with_their_sources():
-    code, said = commands.run(["show", "laws"], 0)
+    code, said = commands.run(["show", "laws", "--details"], 0)
     assert code == 0
     for word in ("hunt-crossley", "flores", "lugre", "doi:10.1007/s11044-010-9237-4", "s/m"):
         assert word in said

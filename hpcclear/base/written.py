@@ -34,7 +34,7 @@ def text_of(value: float, target: str) -> str:
 def unit_for(target: str) -> str:
     """The unit in which most quantities in `target` were written; `target` itself where none was."""
     own = (one for (_, of), one in (TEXTS.get() or {}).items() if of == spelled(target))
-    units = Counter(is_written_in(one) or target for one in own).most_common(1)
+    units = Counter(filter(None, map(is_written_in, own))).most_common(1)
     return units[0][0] if units else target
 
 
@@ -44,12 +44,12 @@ def other_unit(target: str) -> str:
     return "" if unit == target or _SCALED.fullmatch(unit) else unit
 
 
-def shown(value: float, target: str) -> str:
-    """A number (SI) as it was written, any other with six digits in the unit of those in `target` that were written."""
+def shown(value: float, target: str, unit: str = "") -> str:
+    """A number (SI) as it was written, any other with six digits in a unit, by default `unit_for`."""
     if text := text_of(value, target):
         return text
     plain = (TEXTS.get() or {}).get((value, spelled(target)), "")
-    unit = target if plain else unit_for(target)
+    unit = target if plain else unit or unit_for(target)
     if unit == target or not isfinite(value):
         return f"{plain or f'{value:.6g}'} {target.replace('**', '').replace('*', ' ')}".rstrip()
     return f"{value / float(factor(unit, target)):.6g} {unit}"

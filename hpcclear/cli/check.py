@@ -1,6 +1,5 @@
 """What the command `check` prints: effects, states, the study, and the measured run time of a sample."""
 
-import textwrap
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed, place_of, show
-from hpcclear.cli.terminal import WIDTH, print_remark
+from hpcclear.cli.terminal import print_remark, show_rows
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.scene import Scene
@@ -22,18 +21,6 @@ if TYPE_CHECKING:
 
 MOST_WARNINGS = 3
 """Warnings that are printed without ``--details``."""
-
-
-def show_rows(title: str, rows: list[tuple[str, str]]) -> None:
-    """Print what and its value in two columns, with ``--details`` under a title."""
-    if detailed():
-        from hpcclear.cli.tables import console, table
-
-        console().print(table(title, rows))
-        return
-    for label, text in rows:
-        for k, line in enumerate(textwrap.wrap(text, WIDTH - 17) or [""]):
-            show(f"{'' if k else label:15}  {line}")
 
 
 def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from hpcclear.cli.check import show_rows
-from hpcclear.cli.terminal import fitting
+from hpcclear.cli.terminal import show_rows
 from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
 from hpcclear.report.failures import SampledVariable, sentences, where
 from hpcclear.scene import Scene
@@ -12,8 +11,7 @@ from hpcclear.scene import Scene
 def describe(scene: Scene, simulate: bool) -> None:
     """Print which corners of the ranges make no mechanism, and which fail in two revolutions, where, and what to do."""
     found = tried(scene, simulate)
-    rows = [(label, fitting(text)) for label, text in lines(found, simulate)]
-    show_rows("Corners of the study's ranges", rows)
+    show_rows("Corners of the study's ranges", lines(found, simulate))
 
 
 def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:

@@ -7,9 +7,13 @@ from rich import box
 from rich.table import Table
 
 from hpcclear.accuracy.plan import Plan, Row
-from hpcclear.cli.tables import console, table
-from hpcclear.cli.terminal import counted
+from hpcclear.cli.options import detailed
+from hpcclear.cli.tables import console
+from hpcclear.cli.terminal import counted, show_rows
 from hpcclear.ranks.progress import duration
+
+ON_SCREEN = ("memory", "simulations")
+"""Needs of a job that are printed without ``--details``; its time is in the table above."""
 
 RESERVE = 1.5
 """Requested wall time over expected wall time."""
@@ -63,7 +67,8 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
             duration(plan.wall_seconds(one, simulations, ranks)),
         )
     out.print(made)
-    out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
+    needs = _needs(plan, row, simulations, command, ranks)
+    show_rows("The job", needs if detailed() else [one for one in needs if one[0] in ON_SCREEN])
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row, simulations, ranks):
         out.print(line, markup=False, soft_wrap=True)

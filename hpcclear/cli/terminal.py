@@ -4,10 +4,9 @@ import sys
 import textwrap
 
 import click
-import numpy as np
 
 from hpcclear.base.plain import plain
-from hpcclear.report.figures import labels
+from hpcclear.cli.options import detailed, show
 
 WIDTH = 80
 
@@ -18,9 +17,18 @@ def print_remark(label: str, text: str) -> None:
     click.echo(click.style(f"{label}:", fg="yellow") + whole.removeprefix(f"{label}:"))
 
 
-def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A number for people in a unit of a readable size, "nan" where there is none."""
-    return fitting(labels.quantity(value, unit, digits)) if np.isfinite(value) else "nan"
+def show_rows(title: str, rows: list[tuple[str, str]]) -> None:
+    """Print what and its value in two columns, with ``--details`` under a title."""
+    if detailed():
+        from hpcclear.cli.tables import console, table
+
+        console().print(table(title, rows))
+        return
+    width = max(15, *(len(label) for label, _ in rows)) if rows else 15
+    for label, text in rows:
+        lines = textwrap.wrap(fitting(text), WIDTH - width - 2, break_on_hyphens=False)
+        for k, line in enumerate(lines or [""]):
+            show(f"{'' if k else label:{width}}  {line}")
 
 
 def fitting(text: str) -> str:

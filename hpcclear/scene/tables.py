@@ -10,7 +10,8 @@ from pydantic import Field, PrivateAttr
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.base.outcome import IMPACTS, LEVELS, RESPONSES
-from hpcclear.base.written import Texts, reading, shown
+from hpcclear.base.units import is_written_in
+from hpcclear.base.written import Texts, reading, shown, text_of
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.choices import input_entry
@@ -354,7 +355,9 @@ class SceneTables(Table):
 
     def shown(self, path: str, value: float | None = None) -> str:
         """The number at a dotted path as it was written, or another value of it (SI) in its unit; errors as `number`."""
-        return self.in_unit(self.number(path) if value is None else value, self.unit(path))
+        own, unit = self.number(path), self.unit(path)
+        with reading(self._texts):
+            return shown(own if value is None else value, unit, is_written_in(text_of(own, unit)))
 
     def in_unit(self, value: float, unit: str) -> str:
         """A number in SI as the scene has it written, or in the unit of such numbers there."""

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     metavar="COLUMN=QUANTITY",
     help="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
 )
+@cli.DETAILS
 def run(file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]) -> int:
     """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
 
@@ -41,13 +42,13 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
     from hpcclear.cli.tables import console, table
+    from hpcclear.cli.terminal import show_rows
     from hpcclear.report.compare import NOT_ALIGNED, compare
     from hpcclear.results import dataset
 
     pairs = (one.rpartition("=")[::2] for one in names)
     chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
     found = compare(dataset.read(file, "response"), measured, align, chosen)
-    out = console()
     angular = found.axis == "angle"
     moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
     picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
@@ -57,9 +58,12 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
         ("simulated revolutions", f"{found.revolutions} averaged ones, repeated periodically"),
         ("first point", f"in revolution {found.revolution} of these, {picked}"),
     ]
-    out.print(table("Comparison", rows))
-    for one in found.quantities:
-        out.print(table(one.name, _norms(one)))
+    show_rows("Comparison", rows)
+    if cli.detailed():
+        for one in found.quantities:
+            console().print(table(one.name, _norms(one)))
+    else:
+        show_rows("", [(one.name, " ".join(_norms(one)[0])) for one in found.quantities])
     if output is not None:
         from hpcclear.report import overlay_figure, save
 

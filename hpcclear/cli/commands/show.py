@@ -11,12 +11,13 @@ from hpcclear.ranks.stopping import Exit
 
 @cli.command("start", "Show laws, the schema of scene files, or how to cite.")
 @click.argument("what", type=click.Choice(["laws", "schema", "citation"]))
+@cli.DETAILS
 def run(what: str) -> int:
     """Show what this version knows.
 
     laws: laws, geometries of contact, objectives, distributions, surrogates and searches that a scene may name, those of
-    installed packages too; laws with formula, parameters, units, bounds, range and source. To write your own, see
-    docs/extending.md.
+    installed packages too; with --details formulas, parameters, units, bounds, ranges and sources of the laws. To write your
+    own, see docs/extending.md.
 
     schema: the JSON schema of scene files, for editors.
 
@@ -67,6 +68,9 @@ _OTHERS = {
 
 
 def _laws() -> None:
+    if not cli.detailed():
+        _names()
+        return
     from hpcclear import plugins
     from hpcclear.cli.tables import console, table
     from hpcclear.scene.laws import known_laws
@@ -80,6 +84,18 @@ def _laws() -> None:
             console().print(table(name, list(_rows(law, origin))))
     for place, others in _OTHERS.items():
         _list(place, getattr(plugins, others))
+
+
+def _names() -> None:
+    """Print the names alone, in the lines of a terminal."""
+    from hpcclear import plugins
+    from hpcclear.cli.terminal import show_rows
+    from hpcclear.scene.laws import known_laws
+
+    every = {title.partition(" ")[0]: known_laws(kind) for kind, title in _TITLES.items()}
+    every |= {place: getattr(plugins, others).names() for place, others in _OTHERS.items()}
+    show_rows("", [(place, ", ".join(names)) for place, names in every.items()])
+    cli.show("--details prints formulas, parameters with units and bounds, ranges and sources.")
 
 
 def _list(place: str, registry: Any) -> None:
