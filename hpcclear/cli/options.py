@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
+WIDTH = 80
+"""Columns of what is printed."""
+
 PATH = click.Path(path_type=Path, readable=False)  # an unreadable file is reported where it is read
 FILE = click.argument("file", type=PATH)
 SET = click.option(

@@ -11,9 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.options import detailed
+from hpcclear.cli.options import WIDTH, detailed
 from hpcclear.cli.tables import console
-from hpcclear.cli.terminal import WIDTH, fitting
+from hpcclear.cli.terminal import fitting
 from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen

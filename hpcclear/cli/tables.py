@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.plain import plain
-from hpcclear.cli.terminal import WIDTH
+from hpcclear.cli.options import WIDTH
 
 
 class _PlainConsole(Console):

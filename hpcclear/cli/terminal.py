@@ -6,9 +6,7 @@ import textwrap
 import click
 
 from hpcclear.base.plain import plain
-from hpcclear.cli.options import detailed, show
-
-WIDTH = 80
+from hpcclear.cli.options import WIDTH, detailed, show
 
 
 def print_remark(label: str, text: str) -> None:
