@@ -135,7 +135,9 @@ class _Mechanism:
                 line.set(marker="s", markersize=11.0, alpha=0.5)
         radii = unit(np.nan_to_num(gain * known)) + 0.012 * size * unit.factor
         edge: style.Look = {"fill": False, "lw": 1.2, "ec": style.colour("ink"), "animated": True}
-        self._rings = [axes.add_patch(Circle((0.0, 0.0), radius, **edge)) for radius in radii]
+        self._rings = [Circle((0.0, 0.0), radius, **edge) for radius in radii]
+        for ring in self._rings:
+            axes.add_patch(ring)
 
     def at(self, k: int) -> list[Any]:
         """Artists at an instant; more than two points are a closed outline."""

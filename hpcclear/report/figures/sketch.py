@@ -37,7 +37,7 @@ def key(scene: Scene) -> list[str]:
 _WIDTH, _LINE = 170.0, 3.7  # mm of the figure, and of a line of the key
 _HEIGHTS = 55.0, 105.0  # mm, least and most of the drawing
 _BESIDE = 62.0  # mm of the column of curves
-_COLUMN = 60  # letters of a line
+_COLUMN = 57  # letters of a line
 
 
 @style.drawn
