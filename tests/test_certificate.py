@@ -36,8 +36,8 @@ from hpcclear.report.figures.effects import (
     named,
     saving,
     seconds_of,
-    statement,
     statements,
+    undecided,
 )
 from hpcclear.report.html.page import write_report
 from hpcclear.report.html.sections import _changed
@@ -604,11 +604,11 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
         content[name][row] = value
     content["decision"][gravity] = int(Verdict.UNDECIDED)
     # 64 samples whose limits are three times too wide
-    assert "undecided with 64 samples, about 600 would suffice" in statement(content, gravity, {})
+    assert "undecided with 64 samples, about 600 would suffice" in undecided(content, gravity)
     content["change"][row] = 0.025
-    assert statement(content, gravity, {}).endswith("undecided with 64 samples.")
+    assert undecided(content, gravity).endswith("undecided with 64 samples.")
     content["change"][row] = np.nan
-    assert "undecided: 0 of 64 samples failed" in statement(content, gravity, {})
+    assert "undecided, 0 of 64 samples failed" in undecided(content, gravity)
 
 
 def test_figure_and_page(certified):
@@ -622,7 +622,7 @@ def test_figure_and_page(certified):
     assert bars[0].get_width() == pytest.approx(change)
     assert effects_figure(content) is not None
     page = write_report(place).read_text(encoding="utf-8")
-    assert "Without clearance in crank_rod f changes by" in page
+    assert "Changes with effects disabled" in page
     assert "paired measurements with its 95 % confidence interval" in page
     assert "run time saved, estimated from evaluations" in caption(content, None)
 

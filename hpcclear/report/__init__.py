@@ -1,8 +1,8 @@
 """Figures, each a function of a dataset, and the HTML page.
 
-Every function of `hpcclear.report.figures` whose name ends in ``_figure`` is an attribute of this package, and `save` too. They
-are loaded when one is first used: a command that prints a few numbers of a response needs none. Figures need matplotlib
-(the extra ``analysis``), which is imported when the first one is drawn.
+Every function of `hpcclear.report.figures` whose name ends in ``_figure`` is an attribute of this package, `save` and
+`printing` too. They are loaded when one is first used: a command that prints a few numbers of a response needs none. Figures
+need matplotlib (the extra ``analysis``), which is imported when the first one is drawn.
 """
 
 import pkgutil
@@ -20,11 +20,15 @@ def _public() -> dict[str, Any]:
         for m in pkgutil.iter_modules(figures.__path__)
     ]
     named = [(name, one) for module in modules for name, one in vars(module).items()]
-    return {name: one for name, one in named if name == "save" or name.endswith("_figure")}
+    return {name: one for name, one in named if _is_public(name)}
+
+
+def _is_public(name: str) -> bool:
+    return name in ("save", "printing") or name.endswith("_figure")
 
 
 def __getattr__(name: str) -> Any:
-    if (name == "save" or name.endswith("_figure")) and name in _public():
+    if _is_public(name) and name in _public():
         return _public()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

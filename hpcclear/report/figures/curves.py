@@ -75,9 +75,9 @@ def tabulated(scene: Scene) -> list[Tabulated]:
 
 
 @style.drawn
-def tables_figure(found: Results) -> "style.Figure":
+def tables_figure(response: Results) -> "style.Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
-    tables = tabulated(scene_of_text(str(found.attrs["scene"]), "scene"))
+    tables = tabulated(scene_of_text(str(response.attrs["scene"]), "scene"))
     if not tables:
         reason = "nothing in the scene is given by a table"
         raise InputError("scene", "tables", reason, "Draw another figure")

@@ -229,9 +229,9 @@ def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
                 text = labels.literal("baseline" if _kind(design) == "original" else _kind(design))
                 look: style.Look = {
                     "color": style.colour((k - 1) % len(style.NAMES)),
-                    "lw": 0.7,
                     "label": text,
                 }
+                look |= {"lw": 0.7, "ls": style.DASHES[k % len(style.DASHES)]}
                 panel.plot(turn - turn[0], unit(series[design]), **look)
         line[0].set_ylabel(unit.label(words))
     for panel, title in zip(axes[0], columns, strict=True):

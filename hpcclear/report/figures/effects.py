@@ -90,39 +90,25 @@ def shown(value: float, limit: float) -> str:
     return f"{number} ± {limit:.{digits}f} %"
 
 
-def statement(content: Results, variant: int, seconds: Times) -> str:
-    """What leaving an effect out changes and saves, in a sentence."""
-    one = content.isel(variant=variant)
-    change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
-    text = f"Without {label(named(content, variant))} f changes by {change.replace(' ± ', ' % ± ')}"
-    if change == "-":
-        text = f"Without {label(named(content, variant))} the change of f is not known"
-    saved = saving(content, variant, seconds).words
-    return f"{text}, run time saved: {saved}{_verdict(one, float(content.attrs['tolerance']))}."
-
-
-def _verdict(one: Results, tolerance: float) -> str:
-    """What a single variant's changes come to, as the end of its sentence."""
-    counted, found = one["judged"].to_numpy() == 1, one["finding"].to_numpy()
-    if int(one["decision"]) == Verdict.HOLDS:
+def undecided(content: Results, variant: int) -> str:
+    """Why it is not known whether a variant is within the tolerance, and what would decide it; "" where it is known."""
+    one, tolerance = content.isel(variant=variant), float(content.attrs["tolerance"])
+    if int(one["decision"]) != Verdict.UNDECIDED:
         return ""
-    if int(one["decision"]) == Verdict.FAILS:
-        worst = one["response"].to_numpy()[counted & (found == Verdict.FAILS)][0]
-        worst = "standard deviation" if worst == "deviation" else worst
-        return "; needed" if found[0] == Verdict.FAILS else f"; needed for the {worst}"
-    open_ = counted & (found == Verdict.UNDECIDED)
+    open_ = (one["judged"].to_numpy() == 1) & (one["finding"].to_numpy() == Verdict.UNDECIDED)
     room = tolerance - np.abs(one["change"].to_numpy()[open_])
-    count = int(one["samples"])
+    name, count = label(named(content, variant)), int(one["samples"])
     if np.isnan(room).any():
-        return f"; undecided: {int(one['failed'])} of {count} samples failed"
+        return f"{name}: undecided, {int(one['failed'])} of {count} samples failed."
     if room.min() <= 0.0:
-        return f"; undecided with {count} samples"
+        return f"{name}: undecided with {count} samples."
     more = count * float((one["limit"].to_numpy()[open_] / room).max()) ** 2
-    return f"; undecided with {count} samples, about {float(f'{more:.1g}'):.0f} would suffice"
+    more = float(f"{more:.1g}")
+    return f"{name}: undecided with {count} samples, about {more:.0f} would suffice."
 
 
 def statements(content: Results, seconds: Times) -> list[str]:
-    """A sentence for each effect by itself, for pairs that are more than their sum, and for what may be left out."""
+    """A sentence for what is undecided, for pairs that are more than their sum, and for what may be left out."""
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
     chosen = int(np.argmax(content["recommended"].to_numpy()))
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
@@ -133,7 +119,8 @@ def statements(content: Results, seconds: Times) -> list[str]:
             f"Within {tolerance} these effects can be neglected: {names}. "
             f"Run time saved: {saving(content, chosen, seconds).words}."
         )
-    return [*(statement(content, k, seconds) for k in singles), *distinguished(content), last]
+    doubts = (undecided(content, k) for k in singles)
+    return [*filter(None, doubts), *distinguished(content), last]
 
 
 def distinguished(content: Results) -> list[str]:

@@ -213,9 +213,14 @@ def entry(path: str, words: str = "") -> str:
         if words in ("", f"design variable {path}"):
             words = described([path]) if "." in path else path.replace("_", " ")
         made = literal(words)
+    return noted(path, made)
+
+
+def noted(path: str, words: str) -> str:
+    """Return the words that an entry of a scene has in a figure; `called` collects them."""
     if (found := _paths.get()) is not None:
-        found[made] = path
-    return made
+        found[words] = path
+    return words
 
 
 def objective(content: Results) -> str:

@@ -63,7 +63,7 @@ class Fitting(ConstrainedLayoutEngine):
             return
         own = figure.get_size_inches() * 25.4
         larger = "a larger size"
-        for factor in np.arange(1.1, 2.6, 0.1):
+        for factor in np.geomspace(1.15, 3.0, 6):
             figure.set_size_inches(*factor * own / 25.4)
             if not self._cut(figure):
                 larger = "{:.0f}mm x {:.0f}mm, which they fit".format(*factor * own)

@@ -198,8 +198,11 @@ def _equal(axes: "style.Axes", unit: labels.Scale, reach: float | None = None) -
     """Equal scales, the bearing centre in the middle."""
     if reach is None:
         reach = 1.05 * float(np.abs(axes.dataLim.get_points()).max())
+    beside = [one for one in axes.get_shared_y_axes().get_siblings(axes) if one.has_data()]
+    reach = max([reach, *(one.get_xlim()[1] for one in beside if one.get_aspect() == 1.0)])
     reach = reach or 1.0  # a joint without clearance stays in the middle
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    for one in beside or [axes]:
+        one.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set(xlabel=unit.label("eccentricity x"), ylabel=unit.label("eccentricity y"))
 
 

@@ -22,6 +22,7 @@ SMALLEST, LARGEST = 20.0, 1000.0  # mm
 
 _UNIT = re.compile(r"(.*?)(?:\s(\([^()]*\)))?", re.DOTALL)
 """Words of a label, and its unit."""
+_FORMULA = re.compile(r"\s*\$[^$]*\$")
 
 
 @dataclass(frozen=True)
@@ -106,8 +107,8 @@ def _size(text: str) -> tuple[float, float | None]:
     remedy = 'Give a width, "85mm", or width and height, "85mm x 60mm"'
     try:
         sides = [1e3 * to_si(side.strip(), "m") for side in re.split(r"\s*[x×]\s*", text)]
-    except UnitError as error:
-        raise InputError("--size", text, f"it is no length: {error.reason}", remedy) from None
+    except UnitError:
+        raise InputError("--size", text, "it is no length with a unit", remedy) from None
     if len(sides) > 2 or not all(SMALLEST <= side <= LARGEST for side in sides):
         reason = f"width and height of a figure are {SMALLEST:g} to {LARGEST:g} mm"
         raise InputError("--size", text, reason, remedy)
@@ -135,7 +136,7 @@ def _sheet(place: Path) -> dict[str, Any]:
         log.removeHandler(listener)
         log.propagate = True
     if lines:
-        reason = f"matplotlib cannot read it: {lines[0]}"
+        reason = f"matplotlib cannot read it: {lines[0].partition(' You ')[0]}"
         raise InputError("--style", str(place), reason, "Mend that line, or remove it")
     return found
 
@@ -170,9 +171,9 @@ def renamed(
 
     def changed(before: str) -> str:
         words, unit = _UNIT.fullmatch(before.strip()).groups()  # type: ignore[union-attr]
-        names = {words, known.get(_plain(words), words)}
-        user.names.update(names - {""})
-        for name in names & {""} ^ names:
+        names = {words, _FORMULA.sub("", words), known.get(_plain(words), words)} - {""}
+        user.names.update(names)
+        for name in names:
             if found := by_name.get(_plain(name)):
                 user.used.add(found[0])
                 return found[1] + (f" {unit}" if unit and not found[1].endswith(")") else "")

@@ -56,9 +56,8 @@ def samples_figure(samples: Results) -> "style.Figure":
         axes[name].tick_params(labelleft=number % 2 == 1)
     style.legend(figure, first, "lower")
     if others:
-        words = "colour of the points: " + labels.of(main).label(labels.axis(main))
         bar = figure.colorbar(drawn, ax=list(axes.values()), location="bottom", aspect=50, pad=0.02)
-        bar.set_label(words)
+        bar.set_label(labels.of(main).label(labels.axis(main)))
         if names := labels.options(main):
             bar.set_ticks(range(len(names)), labels=names)
     return figure

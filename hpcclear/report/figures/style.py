@@ -22,6 +22,7 @@ from hpcclear.report.figures import labels
 from hpcclear.report.figures.given import several, taken
 from hpcclear.report.figures.printing import Printing, renamed, wanted
 from hpcclear.report.figures.theme import CYCLE as CYCLE
+from hpcclear.report.figures.theme import DASHES as DASHES
 from hpcclear.report.figures.theme import MM, RC, WIDTH, matplotlib
 from hpcclear.report.figures.theme import NAMES as NAMES
 from hpcclear.report.figures.theme import NORMAL as NORMAL
@@ -98,6 +99,11 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
                 if ax is None:
                     _users[figure] = user
                 return figure
+        except KeyError as error:
+            if all(isinstance(one, Results) for one in bound.values()):
+                raise
+            reason = f"{error.args[0]!r} is needed, and not among the arrays"
+            raise InputError(next(iter(bound)), sorted(bound), reason, "Add it") from error
         finally:
             _given.reset(token)
 
@@ -117,6 +123,9 @@ def _beside(
         for state.here, (name, one) in enumerate(every.items()):
             figure = function(**{**values, "response": one})
             mine = [axes for (column, _), axes in state.panels.items() if column == state.here]
+            if not mine:
+                reason, remedy = "this figure shows one design", "Choose one with --design"
+                raise InputError("design", list(every), reason, remedy)
             above = mine[0].get_title(), mine[0].get_title(loc="left")
             mine[0].set_title("\n".join([labels.literal(name), *filter(None, above)]))
             if state.here:

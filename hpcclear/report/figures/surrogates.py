@@ -243,9 +243,9 @@ def symbol(name: str) -> str:
     if name.endswith("_ratio"):
         return f"{symbol(name.removesuffix('_ratio'))} ratio"
     if len(name) == 2 and name[1].isdigit():
-        return f"${name[0]}_{name[1]}$"
+        return labels.noted(name, f"${name[0]}_{name[1]}$")
     if name == "C":
-        return "$C$"
+        return labels.noted(name, "$C$")
     return labels.entry(name)
 
 
