@@ -81,9 +81,9 @@ def tables_figure(response: Results) -> "style.Figure":
     if not tables:
         reason = "nothing in the scene is given by a table"
         raise InputError("scene", "tables", reason, "Draw another figure")
-    figure = style.page(HEIGHT * len(tables))
-    figure.set_layout_engine("none")
-    draw(figure, tables, 1.0, 1.0 / len(tables))
+    figure, axes = style.grid(len(tables), 1, HEIGHT * len(tables))
+    for panel, table in zip(axes[:, 0], tables, strict=True):
+        _curve(panel, table)
     return figure
 
 
@@ -102,24 +102,27 @@ def draw(
         axes = figure.add_axes(
             (left + 0.17 * width, bottom + 0.42 * height, 0.79 * width, 0.42 * height)
         )
-        places, values = np.array(curve.rows).T
-        shown = labels.scale(curve.unit, values)
-        by = (
-            _BY.get(curve.over, _TURNING) if curve.over != "distance" else labels.scale("m", places)
-        )
-        factor = by.factor
-        if curve.turns:
-            places = np.mod(places, 2.0 * np.pi * curve.turns)
-            axes.set_xlim(0.0, 360.0 * curve.turns)
-            axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
-        else:
-            axes.set_xlim(factor * places[0], factor * places[-1])
-        x, y = (places, values) if curve.acting is None else _drawn(curve.acting)
-        axes.plot(factor * x, shown(y), lw=0.9, color=style.CYCLE[2])
-        if len(curve.rows) <= _FEW:
-            axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.CYCLE[2])
-        axes.set_xlabel(by.label(curve.over), fontsize=style.SMALL, labelpad=1.0)
-        axes.set_title(labels.literal(shown.label(curve.key)), fontsize=style.SMALL, pad=2.0)
+        _curve(axes, curve)
+
+
+def _curve(axes: "style.Axes", curve: Tabulated) -> None:
+    """One of them."""
+    places, values = np.array(curve.rows).T
+    shown = labels.scale(curve.unit, values)
+    by = _BY.get(curve.over, _TURNING) if curve.over != "distance" else labels.scale("m", places)
+    factor = by.factor
+    if curve.turns:
+        places = np.mod(places, 2.0 * np.pi * curve.turns)
+        axes.set_xlim(0.0, 360.0 * curve.turns)
+        axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
+    else:
+        axes.set_xlim(factor * places[0], factor * places[-1])
+    x, y = (places, values) if curve.acting is None else _drawn(curve.acting)
+    axes.plot(factor * x, shown(y), lw=0.9, color=style.colour("green"))
+    if len(curve.rows) <= _FEW:
+        axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.colour("green"))
+    axes.set_xlabel(by.label(curve.over), labelpad=1.0)
+    axes.set_title(labels.literal(shown.label(curve.key)), pad=2.0)
 
 
 def _drawn(curve: Pieces) -> tuple[Array, Array]:

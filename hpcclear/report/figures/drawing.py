@@ -1,7 +1,7 @@
 """A mechanism drawn to scale: bodies, joints, guides, drives and loads by their names, with dimensions."""
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations, cycle
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,9 +12,9 @@ from hpcclear.report.figures.lettering import Sheet
 from hpcclear.report.figures.placed import Placed, Pose
 from hpcclear.scene import Scene
 
-CHANGED, ACTING = style.PALETTE["vermilion"], style.PALETTE["green"]
+CHANGED, ACTING = "vermilion", "green"
 """Colours of parts that differ from another design, and of what acts."""
-_KEPT, _FIXED, _OTHER = "#4d4d4d", "#555555", "#9a9a9a"
+_KEPT = _FIXED = _OTHER = "grey"
 _MARGIN = 56.0  # points about the mechanism, for dimensions and names
 _PIN = 2.6  # radius of a pin, points; pins are not to scale
 _GAP = 3.0  # to which the largest clearance is enlarged, points
@@ -81,8 +81,8 @@ class _Drawing(NamedTuple):
         """Lines first, then dimensions, then names, those with least room first."""
         mechanism, sheet = self.scene.linkage, self.sheet
         colours = {
-            body.name: self._colour(body.name, own)
-            for body, own in zip(mechanism.bodies, cycle(style.CYCLE), strict=False)
+            body.name: style.colour(self._colour(body.name, style.colour(k % 7)))
+            for k, body in enumerate(mechanism.bodies)
         }
         for body in mechanism.bodies:
             self._body(body.name, colours[body.name])
@@ -125,7 +125,7 @@ class _Drawing(NamedTuple):
         if len(corners) > 2:
             self.sheet.axes.fill(*corners.T, facecolor=colour, alpha=0.15, zorder=1)
         centre = self.placed.centres[name]
-        self.sheet.dot(centre, "o", 3.4, mfc="white", mec=colour, mew=0.8, zorder=4)
+        self.sheet.dot(centre, "o", 3.4, mfc="paper", mec=colour, mew=0.8, zorder=4)
 
     def _guide(self, joint: Any, colour: str) -> None:
         """The line that a point slides on, a slider, to scale where it has dimensions, and walls; on the ground hatched."""
@@ -153,7 +153,9 @@ class _Drawing(NamedTuple):
         """Strokes on the far side of a line that does not move."""
         starts = middle + np.outer(np.arange(-half, half, self._mm(4.0)[0]), along)
         ends = starts + self._mm(3.0) * (outward - along)
-        self.sheet.axes.plot(*np.stack([starts, ends]).T.swapaxes(1, 2), color=_FIXED, lw=0.4)
+        self.sheet.axes.plot(
+            *np.stack([starts, ends]).T.swapaxes(1, 2), color=style.colour(_FIXED), lw=0.4
+        )
 
     def _ground(self) -> None:
         """Bearings of the ground as triangles on a hatched line; points that nothing turns about as crosses."""
@@ -170,11 +172,11 @@ class _Drawing(NamedTuple):
 
     def _joint(self, joint: Any) -> None:
         """A pin; with clearance a journal in a bearing that is as much larger as said."""
-        place, colour = self._at(joint), self._colour(joint.name, "black")
+        place, colour = self._at(joint), self._colour(joint.name, "ink")
         loose = joint.kind == "clearance"
         size = 2.0 * (_PIN + max(self._gap(joint), 0.7)) if loose else 2.0 * _PIN - 0.8
         if joint.kind != "slide":
-            self.sheet.dot(place, "o", size, mfc="white", mec=colour, mew=0.9, zorder=5)
+            self.sheet.dot(place, "o", size, mfc="paper", mec=colour, mew=0.9, zorder=5)
         if loose:
             self.sheet.dot(place, "o", 2.0 * _PIN, color=colour, mew=0.0, zorder=6)
 
@@ -294,7 +296,7 @@ class _Drawing(NamedTuple):
             if same:
                 same[0][1].extend(lines)
             else:
-                found.append((place, lines, self._colour(joint.name, "black")))
+                found.append((place, lines, self._colour(joint.name, "ink")))
         return found
 
     def _beside(self, name: str) -> Array:

@@ -46,7 +46,7 @@ class Sheet:
     def line(self, places: Any, colour: str, width: float = 0.8, **look: Any) -> None:
         """A line through places (n, 2) that words avoid."""
         corners = np.asarray(places, float)
-        self.axes.plot(*corners.T, color=colour, lw=width, **look)
+        self.axes.plot(*corners.T, color=style.colour(colour), lw=width, **look)
         along = _sampled(self.paper(corners))
         wide = [0.0] if width < _BAR else [-0.5 * width, 0.0, 0.5 * width]
         self._mark(np.vstack([along + np.array([x, y]) for x in wide for y in wide]))
@@ -55,7 +55,8 @@ class Sheet:
 
     def dot(self, place: Any, marker: str, size: float, **look: Any) -> None:
         """A marker of a diameter in points, which words avoid."""
-        self.axes.plot(*place, marker, ms=size, **look)
+        named = {key: style.colour(look[key]) for key in look.keys() & {"mfc", "mec", "color"}}
+        self.axes.plot(*place, marker, ms=size, **{**look, **named})
         turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
         around = self.paper(place) + 0.5 * size * np.column_stack([np.cos(turn), np.sin(turn)])
         self._mark(around)
@@ -64,7 +65,8 @@ class Sheet:
         self, start: Any, end: Any, colour: str, ends: str = "->", width: float = 0.9
     ) -> None:
         """An arrow between two places, with heads as matplotlib writes them."""
-        look: style.Look = {"arrowstyle": ends, "color": colour, "lw": width, "mutation_scale": 7.0}
+        look: style.Look = {"arrowstyle": ends, "color": style.colour(colour), "lw": width}
+        look["mutation_scale"] = 7.0
         first, last = ((float(place[0]), float(place[1])) for place in (start, end))
         self.axes.annotate("", last, first, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})
         self._mark(_sampled(self.paper([first, last])))
@@ -95,7 +97,7 @@ class Sheet:
     def dimension(self, ends: Any, text: str, along: Array, levels: Array) -> bool:
         """Draw a dimension line along a direction (2,) between two places (2, 2), at one of the levels across it (m); return
         whether one has room."""
-        written, size = self._written(text, "black")
+        written, size = self._written(text, "ink")
         across, best, least = np.array([-along[1], along[0]]), None, np.inf
         places = np.asarray(ends, float)
         for k, level in enumerate(levels):
@@ -118,20 +120,25 @@ class Sheet:
             return False
         feet, middle, room = best
         for place, foot in zip(places, feet, strict=True):
-            self.line([place, foot + 2.0 * _unit(foot - place) / self.per_m], "#777777", 0.4)
-        self.arrow(feet[0], feet[1], "black", "<->" if room else "-", 0.5)
+            self.line([place, foot + 2.0 * _unit(foot - place) / self.per_m], "grey", 0.4)
+        self.arrow(feet[0], feet[1], "ink", "<->" if room else "-", 0.5)
         if not room:  # arrows from outside, as the words do not fit between
             for foot, way in ((feet[0], along), (feet[1], -along)):
-                self.arrow(foot - 7.0 * way / self.per_m, foot, "black", "->", 0.5)
+                self.arrow(foot - 7.0 * way / self.per_m, foot, "ink", "->", 0.5)
         self._put(written, middle, size)
         return True
 
     def _written(self, text: str, colour: str) -> tuple[Any, Array]:
         """A word at no place yet, and its size (2,) in points."""
-        back = {"boxstyle": "square,pad=0.05", "fc": "white", "ec": "none", "alpha": 0.85}
+        back = {
+            "boxstyle": "square,pad=0.05",
+            "fc": style.colour("paper"),
+            "ec": "none",
+            "alpha": 0.85,
+        }
         made = self.axes.text(
-            0.0, 0.0, labels.literal(text), color=colour, ha="center", va="center", zorder=8,
-            fontsize=style.SMALL, linespacing=1.1, bbox=back,
+            0.0, 0.0, labels.literal(text), color=style.colour(colour), ha="center", va="center", zorder=8,
+            linespacing=1.1, bbox=back,
         )  # fmt: skip
         box = made.get_window_extent(self._renderer)
         return made, np.array([box.width, box.height]) * 73.5 / self.axes.figure.dpi + 1.0

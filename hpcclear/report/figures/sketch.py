@@ -67,7 +67,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
     axes = figure.add_axes((0.0, 1.0 - drawn / height, width / _WIDTH, drawn / height))
     remark = drawing.draw(axes, scene, poses)
     curves.draw(figure, tables, 1.0, curves.HEIGHT / height, (width / _WIDTH, _BESIDE / _WIDTH))
-    look: style.Look = {"va": "top", "fontsize": style.SMALL}
+    look: style.Look = {"va": "top"}
     top = 1.0 - (above + 0.5 * _LINE) / height
     figure.text(0.02, top, remark, **look)
     for x, lines in zip((0.02, 0.52), columns, strict=True):
@@ -97,7 +97,7 @@ def mechanism_figure(response: Results, before: Results | None = None) -> "style
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, _LINE / height, 1.0, 1.0 - _LINE / height))
     remark = drawing.draw(axes, scene, poses, changed, other)
-    figure.text(0.02, 0.5 * _LINE / height, remark, fontsize=style.SMALL)
+    figure.text(0.02, 0.5 * _LINE / height, remark)
     return figure
 
 

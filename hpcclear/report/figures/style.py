@@ -21,13 +21,9 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
 from hpcclear.report.figures.given import several, taken
 from hpcclear.report.figures.printing import Printing, renamed, wanted
-from hpcclear.report.figures.theme import CYCLE as CYCLE
 from hpcclear.report.figures.theme import DASHES as DASHES
 from hpcclear.report.figures.theme import MM, RC, WIDTH, matplotlib
 from hpcclear.report.figures.theme import NAMES as NAMES
-from hpcclear.report.figures.theme import NORMAL as NORMAL
-from hpcclear.report.figures.theme import PALETTE as PALETTE
-from hpcclear.report.figures.theme import SMALL as SMALL
 from hpcclear.report.figures.theme import Look as Look
 from hpcclear.report.figures.theme import categories as categories
 from hpcclear.report.figures.theme import colour as colour

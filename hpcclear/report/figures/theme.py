@@ -31,12 +31,6 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
-SMALL, NORMAL = 7.0, 7.5
-CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-PALETTE = dict(
-    zip(("blue", "vermilion", "green", "purple", "sky", "orange", "black"), CYCLE, strict=True)
-)
-
 
 def _theme(paper: str, ink: str, faint: str, *curves: str) -> dict[str, str]:
     """Settings of the colours of page, text, grid and curves."""
@@ -109,7 +103,7 @@ def matplotlib() -> Any:
 
 def colour(which: int | str) -> str:
     """A colour of the style in use: that of curve k of several, or by its name in `NAMES`; "paper" and "ink" are those of page
-    and text, "grey" stands between them, and "faint" is that of the grid."""
+    and text, "grey" stands between them, "faint" is that of the grid; any other is itself."""
     from matplotlib.colors import to_hex, to_rgb
 
     settings = matplotlib().rcParams
@@ -121,6 +115,8 @@ def colour(which: int | str) -> str:
         ends = (np.array(to_rgb(settings[named[name]])) for name in ("ink", "paper"))
         red, green, blue = np.average([*ends], axis=0, weights=[0.54, 0.46])
         return to_hex((red, green, blue))
+    if isinstance(which, str) and which not in NAMES:
+        return which
     every = settings["axes.prop_cycle"].by_key().get("color", ["C0"])
     at = which if isinstance(which, int) else NAMES.index(which)
     return to_hex(every[at % len(every)])
