@@ -1,5 +1,6 @@
 """Designs of a study simulated in this process, on scatter of one's own choice: what the judges of a study share."""
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.streams import generator
 from hpcclear.study.simulations import Simulations
 
 
@@ -26,4 +28,6 @@ class Here(Simulations):
 
 def run_of(scene: Scene) -> Any:
     """As much of a run as `hpcclear.study.truth` needs."""
-    return SimpleNamespace(scene=scene, study=scene.required_study, simulations=Here(scene))
+    study = scene.required_study
+    rng = partial(generator, study.seed)
+    return SimpleNamespace(scene=scene, study=study, simulations=Here(scene), rng=rng)

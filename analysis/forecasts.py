@@ -26,7 +26,7 @@ from hpcclear.scene import Scene
 from hpcclear.study import forecast
 
 RESULTS = Path(__file__).parent / "results" / "forecasts.csv"
-FIELDS = "seed", "kind", "search", "asked", "forecast", "simulations", "ratio"
+FIELDS = "seed", "kind", "asked", "forecast", "simulations", "ratio"
 WITHIN = 1.5
 
 MASS = {"formula": "0 - m2 - m3"}
@@ -56,8 +56,7 @@ def main() -> None:
         with dynamics(form), tempfile.TemporaryDirectory() as name:
             said, _ = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
             _, count = carried_out(scene, Path(name) / "out")
-        search = scene.required_study.surrogate.of or "by default"
-        values = seed, kind, search, asked, said, count, round(said / count, 3)
+        values = seed, kind, asked, said, count, round(said / count, 3)
         rows.append(dict(zip(FIELDS, values, strict=True)))
         print(*values, flush=True)
         with words.out.open("w", newline="") as file:
@@ -93,8 +92,6 @@ def study(seed: int) -> tuple[Scene, Form, str, str]:
         "deviation": float(rng.uniform(0.005, 0.03)),
     }
     scene = scene_of(seed, random, case, verification=verification, accuracy=accuracy)
-    if rng.random() < 1.0 / 3.0:
-        scene = scene.with_({"study.surrogate.of": "statistics"})
     return scene, form, kind, asked
 
 

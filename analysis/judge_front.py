@@ -53,8 +53,9 @@ def main() -> None:
 
 def simulated(scene: Scene, designs: list[Choice], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean and deviation, (n, 2), and what each replicate shifts them by, (2, n, 16)."""
-    length = count // REPLICATES
-    found = truth.sequences(run_of(scene), designs, "judge", "judge", length, count)
+    run = run_of(scene)
+    made = truth.looked_at(run, designs, "judge", "judge", count // REPLICATES)
+    found = truth.results_of(run, designs, made)
     values = np.column_stack([found["mean"], found["deviation"]])
     return values, np.stack([found["mean_shifts"], found["deviation_shifts"]])
 

@@ -33,7 +33,7 @@ FEATURES = {
     "the paper's study: its numbers and claims":
         "study/paper/* study/claims.py study/printed.py study/readings.py",
     "rare failures, worst cases, constraints tested":
-        "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
+        "statistics/random/importance.py statistics/random/tail.py study/rare.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
         "scene/sheets.py scene/delimited.py "
@@ -83,7 +83,7 @@ FEATURES = {
     "distributions of random inputs":
         "scene/random_inputs.py scene/correlation.py scene/random_inputs.py base/quantiles.py statistics/random/rules.py",
     "a front searched by simulations, judged with intervals":
-        "statistics/search/improvement.py statistics/search/infill.py statistics/search/certainty.py study/refinement.py "
+        "statistics/search/improvement.py statistics/search/certainty.py study/search.py "
         "study/truth.py study/verification.py",
     "contact and friction laws, built in":
         "laws/normal/* laws/friction/* laws/hertz_contact.py scene/laws.py "

@@ -31,17 +31,14 @@ from hpcclear.report.constraints import worded
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.domain import box
-from hpcclear.scene.sampling import unit_lhs
-from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import student
 from hpcclear.statistics.random.tail import of_share
-from hpcclear.study import edge, rare, tried, truth
+from hpcclear.study import rare, search, truth
 from hpcclear.study.optimisation import Choice
 
 REPEATS, SHARE, CORRELATION, LEVELS = 8, 0.1, 0.8, 9
-WIDE, LENGTH, ROUNDS = 20, 64, 3
-"""Designs of the judge's own search, points of each of their replicates, and designs that it then judges."""
+LENGTH, ROUNDS = 64, 3
+"""Points of each replicate that a limit is taken from, and designs of the judge's own search that it judges."""
 
 HALVINGS, CLOSE = 4, 5e-4
 """Designs that are judged between one that is allowed and one that is not, at most, and the relative difference of their first
@@ -112,7 +109,9 @@ def own(name: str) -> Scene:
     scene = regret.scene_of(name).with_({f"numerics.{key}": value for key, value in BRIEF.items()})
     (case,) = scene.required_study.cases
     choice = regret.choice_at(scene, [0.5] * len(scene.required_study.design_variables(case.name)))
-    found = truth.sequences(run_of(scene), [choice], "limit", "limit", LENGTH, LENGTH * REPLICATES)
+    run = run_of(scene)
+    made = truth.looked_at(run, [choice], "limit", "limit", LENGTH)
+    found = truth.results_of(run, [choice], made)
     limit = float(found["mean"][0] + of_share(most) * found["deviation"][0])
     row = {"statistic": "exceedance", "limit": float(f"{limit:.4g}"), "most": most}
     return scene.with_(
@@ -162,23 +161,19 @@ def judged(scene: Scene, place: Path, simulations: int) -> dict[str, Any]:
 def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -> float:
     """The least first objective that a probability of failure allows, of designs that were judged.
 
-    `edge` seeks it by the index that 1024 simulations of each design extrapolate, shifted by what that is wrong at the design
-    judged last. Then designs are judged between the best one that is allowed and the best one that is not (halving), all
-    on the same random numbers.
+    A search on scatter of its own begins with the recommended design and is given four times the simulations. Designs are then
+    judged between the best one that is allowed and the best one that is not (halving), all on the same random numbers.
     """
-    run, case = run_of(scene), scene.required_study.cases[0]
-    run.rng = lambda *words: np.random.default_rng(83)
-    names, goal = list(choice.design), case.kept[0]
-    region, rng = box(scene, names), np.random.default_rng(82)
-    unit = unit_lhs(WIDE, len(names), rng)
-    where = np.vstack([list(choice.design.values()), region.lower + unit * (region.upper - region.lower)])  # fmt: skip
-    choices = [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in where]
-    found = truth.sequences(run, choices, "search", "search", LENGTH, LENGTH * REPLICATES)
-    values = found["goal"][:, : len(case.goals)]
-    bounds = tried.bounds(run, names)
-    model = edge._steering(where, found["excess"], bounds, rng)
-    objectives = edge._objectives(run, case, where, values, rng)
-    met = {goal.most >= share: (float(objectives[0](where[:1])[0]), where[0])}
+    case, names = scene.required_study.cases[0], list(choice.design)
+    goal, place = case.kept[0], np.array(list(choice.design.values()))
+    settings = scene.required_study.verification
+    own = scene.with_({
+        "study.seed": 83,
+        "study.verification.infill_rounds": 2 * settings.infill_rounds,
+        "study.verification.infill_samples": 2 * settings.infill_samples,
+    })  # fmt: skip
+    found, _ = search.searched(run_of(own), [choice])
+    met = {goal.most >= share: (float(case.goals[0].of_design(choice.design)), place)}
 
     def judged(place: np.ndarray) -> float:
         """The share of a design, which takes the place of a worse one that is allowed or not as it is."""
@@ -187,17 +182,14 @@ def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -
             probability(scene, trial, simulations // REPEATS, np.random.default_rng([84, k]))
             for k in range(REPEATS // 2)
         ])  # fmt: skip
-        least, kept = float(objectives[0](place[None])[0]), bool(found <= goal.most)
+        least, kept = float(case.goals[0].of_design(trial.design)), bool(found <= goal.most)
         print(f"  tried: {trial.design}: {found:.3g}, objective {least:.5g}", flush=True)
         if kept not in met or least < met[kept][0] or not kept:
             met[kept] = least, place
         return float(found)
 
-    last = where[0]
-    for _ in range(ROUNDS):
-        short = of_share(goal.most) - of_share(share) - float(model(last[None])[0])
-        last = edge._best(edge._judge(run, case, model, objectives, short), bounds, where, rng)
-        share = judged(last)
+    for one in found[-ROUNDS:]:
+        judged(np.array(list(one.design.values())))
     for _ in range(HALVINGS if len(met) == 2 else 0):
         (kept, inside), (broken, outside) = met[True], met[False]
         if kept - broken <= CLOSE * abs(kept):

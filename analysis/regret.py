@@ -3,17 +3,15 @@
     python analysis/regret.py OUT                      # ten studies, an hour on one core; writes analysis/results/regret.csv
     python analysis/regret.py OUT press my_study.toml  # some of them, or a scene with one case of one's own
 
-Each study is carried out with models of f (`study.surrogate.of = "f"`) and of the statistics over designs; `by_default` is 1
-for the one that is taken if a study does not say, by R2 of the surrogate of f. The reference
-goes on from both: a search by expected improvement with `WIDE` more designs and `ROUNDS` times `BATCH` further ones, each of
-`POINTS` simulations: three times as many simulations as either search has. A hundred times as many would take some hours.
+The reference goes on from the recommended design: a search with up to `ROUNDS` times `BATCH` further designs, each of up to
+`POINTS` simulations. A hundred times as many would take some hours.
 What counts is what a study recommends by: the first objective, or mean + 2 standard deviations where both are minimised.
 
 The best designs of the reference are compared by `CHOSEN` simulations each. The best of them and the recommended ones
 are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen, or by up to `MOST` until the
 standard errors of the differences are below `SURE`.
-Regret is how far a recommended design is above the least of these three, with the standard error of that difference. It
-is never negative, so the least of three has some luck: a regret within its error is none.
+Regret is how far a recommended design is above the least of both, with the standard error of that difference. It
+is never negative, so the less of two has some luck: a regret within its error is none.
 Results are kept in OUT, so that the command goes on where it was stopped.
 """
 
@@ -34,26 +32,22 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.report.merit import SPAN, recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.domain import box, to_coordinates, to_physical
+from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
-from hpcclear.statistics.search import improvement
-from hpcclear.statistics.search.improvement import Known
-from hpcclear.study import by_statistics, forecast, run_study, simulations, tried, truth
+from hpcclear.study import forecast, run_study, search, simulations, truth
+from hpcclear.study.goals import excess
 from hpcclear.study.optimisation import Choice
 
 HERE = Path(__file__).parent
 JOBS = HERE.parent / "jobs"
-WIDE, ROUNDS, BATCH, POINTS = 24, 6, 8, 256
+ROUNDS, BATCH, POINTS = 12, 8, 512
 CHOSEN, JUDGED, MOST, BEST = 512, 4096, 16384, 6
 SURE = 0.0025
 RESULTS = HERE / "results" / "regret.csv"
 FIELDS = (
     "study",
-    "searched_by",
-    "by_default",
     "r2_of_f",
     "simulations",
     "forecast",
@@ -298,9 +292,6 @@ def main() -> None:
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--seed", type=int, help="another seed than the study's")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="of the reference")
-    parser.add_argument(
-        "--of", nargs="*", default=["f", "statistics"], help="what is searched: f, statistics"
-    )
     parser.add_argument("--csv", type=Path, default=RESULTS)
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
@@ -311,66 +302,45 @@ def main() -> None:
         if words.seed is not None:
             scene = scene.with_({"study.seed": words.seed})
         label = Path(name).stem + ("" if words.seed is None else f"_{words.seed}")
-        for row in measured(words.out / label, label, scene, words.rounds, words.of):
-            rows.append(row)
-            print(*row.values(), flush=True)
+        rows.append(measured(words.out / label, label, scene, words.rounds))
+        print(*rows[-1].values(), flush=True)
         with words.csv.open("w", newline="") as file:
             table = csv.DictWriter(file, FIELDS)
             table.writeheader()
             table.writerows(rows)
-    for of in (*words.of, "default"):
-        some = [
-            row["regret"]
-            for row in rows
-            if of == row["searched_by"] or (of == "default" and row["by_default"])
-        ]
-        print(f"{of}: regret {np.median(some):.2%} in the median, {max(some):.2%} at most")
+    some = [row["regret"] for row in rows]
+    print(f"regret {np.median(some):.2%} in the median, {max(some):.2%} at most")
 
 
-def measured(
-    place: Path, label: str, scene: Scene, rounds: int, ways: list[str]
-) -> list[dict[str, Any]]:
-    """Carry out a study in some ways; the regret of each, relative to the least, in rows of the table."""
+def measured(place: Path, label: str, scene: Scene, rounds: int) -> dict[str, Any]:
+    """Carry out a study; the regret of its recommended design, relative to the least, in a row of the table."""
     place.mkdir(exist_ok=True)
-    runs = {}
-    for of in ways:
-        changed = scene.with_({"study.surrogate.of": of})
-        runs[of] = carried_out(changed, place / of)
+    directory, spent = carried_out(scene, place / "study")
     case = scene.required_study.cases[0].name
     names = scene.required_study.design_variables(case)
-    taken = []
-    for directory, _ in runs.values():
-        table = dataset.read(directory / "verification.nc", "verification").to_xarray()
-        best = table.sel(design=recommended(table))
-        taken.append([float(best[name]) for name in names])
+    table = dataset.read(directory / "verification.nc", "verification").to_xarray()
+    best = table.sel(design=recommended(table))
+    taken = [[float(best[name]) for name in names]]
     kept = place / "reference.npy"
     if not kept.exists():
         found = choices_of(scene, case, reference(scene, case, rounds, np.array(taken)))
         values, _, broken = merits(scene, found, told(scene, found, CHOSEN // REPLICATES, "chosen"))
         np.save(kept, list(found[int(np.where(broken, np.inf, values).argmin())].design.values()))
     values, errors, broken, least = judged(scene, choices_of(scene, case, [*taken, np.load(kept)]))
-    told_of = []
-    for row, (of, (directory, spent)) in enumerate(runs.items()):
-        models = dataset.read(directory / "kriging.nc", "kriging").to_xarray()
-        said, _ = forecast.expected(
-            scene.with_({"study.surrogate.of": of}), partial(evaluated, scene), 1e-3
-        )
-        regret = (values[row] - values[least]) / abs(values[least])
-        r2 = float(models.r2[-1])
-        cells = (
-            label,
-            of,
-            int((of == "statistics") == (r2 < by_statistics.ROUGH)),
-            round(r2, 3),
-            spent,
-            said,
-            f"{values[least]:.6g}",
-            round(regret, 6),
-            round(float(errors[row]), 6),
-            int(broken[row]),
-        )
-        told_of.append(dict(zip(FIELDS, cells, strict=True)))
-    return told_of
+    models = dataset.read(directory / "kriging.nc", "kriging").to_xarray()
+    said, _ = forecast.expected(scene, partial(evaluated, scene), 1e-3)
+    regret = (values[0] - values[least]) / abs(values[least])
+    cells = (
+        label,
+        round(float(models.r2[-1]), 3),
+        spent,
+        said,
+        f"{values[least]:.6g}",
+        round(regret, 6),
+        round(float(errors[0]), 6),
+        int(broken[0]),
+    )
+    return dict(zip(FIELDS, cells, strict=True))
 
 
 def choices_of(scene: Scene, case: str, rows: Any) -> list[Choice]:
@@ -398,9 +368,12 @@ def merits(
     scene: Scene, choices: list[Choice], found: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a study recommends designs by, what replicates shift it, and whether designs break a constraint."""
-    weights = np.array([1.0, SPAN] if scene.required_study.case(choices[0].case).plain else [1.0])
+    case = scene.required_study.case(choices[0].case)
+    weights = np.array([1.0, SPAN] if case.plain else [1.0])
     values, shifts = (found[part][:, : len(weights)] for part in ("goal", "goal_shifts"))
-    return values @ weights, np.einsum("nkr,k->nr", shifts, weights), found["excess"] > 0.0
+    kept = found["goal"][:, len(case.goals) : len(case.goals) + len(case.kept)]
+    broken = excess(case.kept, kept)
+    return values @ weights, np.einsum("nkr,k->nr", shifts, weights), broken > 0.0
 
 
 def carried_out(scene: Scene, place: Path) -> tuple[Path, int]:
@@ -429,47 +402,18 @@ def evaluated(scene: Scene, points: Points) -> np.ndarray:
 
 def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict[str, np.ndarray]:
     """What designs come to by so many points of each scrambling."""
-    return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * REPLICATES)
+    run = run_of(scene)
+    return truth.results_of(run, choices, truth.looked_at(run, choices, purpose, purpose, length))
 
 
 def reference(scene: Scene, case: str, rounds: int, start: np.ndarray) -> np.ndarray:
-    """The best designs of a long search, which begins with some designs and others all over the box, (k, d)."""
-    run = run_of(scene)
-    names = scene.required_study.design_variables(case)
-    rng = np.random.default_rng(77)
-    bounds = tried.bounds(run, names)
-    known_so_far = None
-    unit = unit_lhs(WIDE, len(names), rng)
-    where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
-    where = np.vstack([to_coordinates(scene, names, start), where])
-    for _ in range(rounds + 1):
-        choices = tried.choices(run, case, where)
-        found = told(scene, choices, POINTS // REPLICATES, "reference")
-        count = len(scene.required_study.case(case).goals)
-        made = {
-            "case": np.array([case] * len(choices)),
-            "design": np.array([[one.design.get(n, np.nan) for n in scene.required_study.optimisation] for one in choices]),
-            "values": found["goal"][:, :count],
-            "errors": np.array([spread(one) for one in found["goal_shifts"][:, :count]]),
-            "excess": found["excess"],
-        }  # fmt: skip
-        known_so_far = tried.added(run, case, made, known_so_far)
-        known, space = by_statistics._problem(run, case, known_so_far)
-        where = improvement.proposals(known, space, BATCH, rng)
-        if not len(where):
-            break
-    return np.array([list(one.design.values()) for one in _ended(run, case, known, space, rng)])
-
-
-def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.random.Generator) -> list[Choice]:  # fmt: skip
-    """Designs that are believed to be the best, and those that were."""
-    beliefs = improvement.Beliefs(known, space, rng)
-    goal = space.directions[-1 if run.study.case(case).plain else 0]
-    order = np.argsort(beliefs.believed @ goal, kind="stable")[: BEST // 2]
-    lucky = np.argsort(known.values[beliefs.allowed] @ goal, kind="stable")[: BEST // 2]
-    rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
-    ends = improvement.finalists(known, space, 2, rng)
-    return tried.choices(run, case, np.unique(np.vstack([rows, ends]), axis=0))
+    """The best designs of a long search on scatter of its own, which begins with some designs, (k, d)."""
+    more = {"infill_rounds": rounds, "infill_designs": BATCH, "infill_samples": POINTS}
+    own = scene.with_({f"study.verification.{key}": value for key, value in more.items()})
+    own = own.with_({"study.seed": scene.required_study.seed + 7000})
+    run = run_of(own)
+    found = search.searched(run, choices_of(own, case, start))[0]
+    return np.array([list(one.design.values()) for one in found])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Numbers with limits: replicates, what can be told apart, and where to look next."""
+"""Numbers with limits: replicates, what can be told apart, and which designs are simulated until they decide."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +12,6 @@ from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.statistics.search.infill import NEAR, believed_ends, proposals
 from hpcclear.study import truth
 from hpcclear.study.optimisation import Choice
 
@@ -151,11 +150,11 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
 # -- which end is one -------------------------------------------------------------------------------
 
 
-def contested(monkeypatch, contest: int, origin: str = "search") -> list[int]:
+def raced(monkeypatch, contest: int, origin: str = "search") -> list[int]:
     """Simulations of three designs of deviations 0.1, 0.1005 and 0.2 after 512, where 0.5 % is asked for."""
     scene = load_scene(ROBUST).with_(
         {
-            "study.cases": {"one": ["C"]},
+            "study.cases": {"one": {"random": ["C"], "objectives": ["deviation"]}},
             "study.accuracy": {"mean": 0.5, "deviation": 0.005},
             "study.verification": {"contest": contest, "most_samples": 4096},
         }
@@ -173,14 +172,14 @@ def contested(monkeypatch, contest: int, origin: str = "search") -> list[int]:
 
     monkeypatch.setattr(truth, "_values", drawn)
     made = drawn(run, choices, "", "", 32, 0)
-    return [one[0].size for one in truth.contested(run, choices, made, "", "")]
+    return [one[0].size for one in truth.made(run, choices, made)]
 
 
 def test_who_contests_an_end_gets_more_simulations(monkeypatch):
-    assert contested(monkeypatch, 4) == [2048, 2048, 512]
-    assert contested(monkeypatch, 1) == [512, 512, 512]
-    assert contested(monkeypatch, 64) == [4096, 4096, 512]  # most_samples
-    assert contested(monkeypatch, 4, "given") == [512, 512, 512]
+    """The one that is twice as wide is out at once; of the others each may get `contest` times the simulations of the least."""
+    first, second, third = raced(monkeypatch, 64)
+    assert (first, second, third) == (4096, 4096, 512)  # most_samples
+    assert raced(monkeypatch, 64, "given") == [512, 512, 512]
 
 
 def outliers(rng, shape):
@@ -203,57 +202,3 @@ def test_limits_of_a_deviation_that_few_values_carry_hold(draw, exact, least, sh
         low, high = limits(moments(draw(rng, (16, 32)))[1], 0.95)
         held += low <= exact <= high
     assert held >= least * 400 - 10
-
-
-# -- where to look next -----------------------------------------------------------------------------
-
-BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
-
-
-def rippled(x):
-    """Both least at x2 = -2; in x1 the first falls, the second has its least valley near 0.3."""
-    slope = 0.5 * (x[:, 1] + 2.0)
-    first = 2.0 - 0.3 * x[:, 0] + slope
-    second = 1.0 + 0.1 * (x[:, 0] - 0.5) ** 2 + 0.05 * np.cos(2 * np.pi * (x[:, 0] - 0.3) / 0.3)
-    return np.column_stack([first, second - 0.1 + slope])
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_proposals_find_the_least_of_both(seed):
-    rng = np.random.default_rng(seed)
-    designs = BOUNDS[:, 0] + rng.random((16, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    values = rippled(designs)
-    for _ in range(5):
-        more = proposals(designs, values, BOUNDS, 8, rng)
-        assert 0 < len(more) <= 8
-        assert ((more >= BOUNDS[:, 0]) & (more <= BOUNDS[:, 1])).all()
-        designs, values = np.vstack([designs, more]), np.vstack([values, rippled(more)])
-    grid = np.column_stack([np.linspace(0, 1, 2001), np.full(2001, -2.0)])
-    assert (values.min(axis=0) < rippled(grid).min(axis=0) + 0.01).all()
-    steps = abs(designs[:, None] - designs) / (BOUNDS[:, 1] - BOUNDS[:, 0])
-    apart = steps.max(axis=2)[np.triu_indices(len(designs), 1)]
-    assert apart.min() > NEAR
-
-
-def test_the_least_of_values_with_errors_is_what_all_of_them_make_it():
-    """Means over 40 sets: the design of the least value is a lucky one, farther off than what a model believes."""
-    off = np.zeros((40, 2))
-    for k in range(len(off)):
-        rng = np.random.default_rng(k)
-        designs = BOUNDS[:, 0] + rng.random((60, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-        along = (designs[:, 0] - 0.3) ** 2
-        values = np.column_stack([along + 0.02 * rng.standard_normal(60), designs[:, 0]])
-        (row, other) = believed_ends(designs, values, BOUNDS, rng, None)
-        off[k] = along[row], along[values[:, 0].argmin()]
-        assert abs(designs[other, 0] - designs[:, 0].min()) < 0.02  # without errors it is the least
-    assert off[:, 0].mean() < 0.5 * off[:, 1].mean()
-
-
-def test_what_breaks_a_constraint_is_not_believed_to_be_an_end():
-    rng = np.random.default_rng(3)
-    designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    values = designs[:, :1]
-    (free,) = believed_ends(designs, values, BOUNDS, rng, None)
-    (kept,) = believed_ends(designs, values, BOUNDS, rng, 0.5 - designs[:, 0])
-    assert designs[free, 0] < 0.1
-    assert 0.5 <= designs[kept, 0] < 0.6

@@ -30,7 +30,6 @@ KINDS = {
     "accurate": ["study.accuracy={mean=1e-3, deviation=2e-3}"],
     "percentile": ['study.cases.robust.objectives=[{statistic="quantile"}, {formula="m2"}]'],
     "draws": ["study.verification.samples=400"],
-    "statistics": ['study.surrogate.of="statistics"'],
     "one objective": ['study.cases.robust.objectives=["deviation"]'],
 }
 
@@ -40,7 +39,6 @@ KINDS = {
     [
         "usual",
         "draws",
-        "statistics",
         "one objective",
         pytest.param("accurate", marks=pytest.mark.full),
         pytest.param("percentile", marks=pytest.mark.full),
@@ -63,24 +61,6 @@ def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
     carried_out(scene)
     assert said == pytest.approx(sum(counted), rel=0.5), (said, sum(counted))
     assert sum(counted) < 1.5 * said
-
-
-def rough(column):
-    c = column["joints.crank_rod.clearance"]
-    return 1e-4 * (column["mechanism.slider.mass"] + np.sin(1e9 * c)) + 0.1 * c
-
-
-@pytest.mark.parametrize(("f", "search"), [(formula.objective, "f"), (rough, "statistics")])
-def test_a_pilot_shows_which_search_follows(f, search, monkeypatch):
-    formula.replace_dynamics(monkeypatch.setattr)
-    monkeypatch.setattr(formula, "objective", f)
-    said = {}
-    for of in ("", "f", "statistics"):
-        scene = scene_of(STUDY, *([f'study.surrogate.of="{of}"'] if of else []))
-        pilot = partial(sample_points, scene, ranks=alone())
-        said[of], _ = forecast.expected(scene, pilot, 1e-6)
-    assert said["f"] != said["statistics"]
-    assert said[""] == said[search]
 
 
 def test_without_a_pilot_the_most_is_said():

@@ -19,7 +19,6 @@ from hpcclear.report.html import designs
 from hpcclear.report.html.content import Content
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.random.replicates import exceedance, quantile
-from hpcclear.statistics.search.infill import proposals
 
 QUICKSTART = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 RANDOM = ["C", "m2", "m3", "u2", "I2"]
@@ -177,37 +176,6 @@ def test_shifts_of_a_quantile_are_as_large_as_it_scatters(method: str, order: fl
 
 
 # -- where to look next -----------------------------------------------------------------------------
-
-
-@pytest.mark.nightly
-def test_proposals_keep_the_constraints() -> None:
-    """Least x + y and least (x - 1)^2 where x + y >= 1: on the line, to x = 1."""
-    rng = np.random.default_rng(4)
-    bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
-    designs = rng.random((30, 2))
-
-    def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.stack([x.sum(axis=1), (x[:, 0] - 1) ** 2], axis=1), 1.0 - x.sum(axis=1)
-
-    values, broken = evaluate(designs)
-    found = proposals(designs, values, bounds, 8, rng, broken)
-    least, excess = evaluate(found)
-    assert np.abs(excess).min() < 0.02
-    assert (
-        excess < 0.05
-    ).mean() > 0.7  # some are sought beyond, as far as models do not rule it out
-    free = proposals(designs, values, bounds, 8, rng)
-    assert least[:, 0].min() > 0.9 > evaluate(free)[0][:, 0].min()
-
-
-def test_where_nothing_keeps_the_constraints_proposals_go_towards_them() -> None:
-    rng = np.random.default_rng(5)
-    designs = rng.random((30, 2))
-    values, broken = np.stack([designs[:, 0], 1 - designs[:, 0]], axis=1), 5.0 + designs[:, 1]
-    found = proposals(designs, values, np.array([[0.0, 1.0], [0.0, 1.0]]), 6, rng, broken)
-    nearest = designs[broken.argmin()]
-    assert len(found) == 6
-    assert np.abs(found - nearest).max() < 0.5
 
 
 # -- a study ----------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
-from types import SimpleNamespace
-
 import moocore
 import numpy as np
 import opened
@@ -11,8 +9,8 @@ from formula_study import contents, formula, on_two_ranks, scene_of
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
-from hpcclear.statistics.search.improvement import Known, Space
-from hpcclear.study import by_statistics, extent, tried
+from hpcclear.statistics.search.improvement import Beliefs, Known, Space
+from hpcclear.study import extent
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -44,7 +42,20 @@ def bowl(x):
     return (x[:, 0] - 0.3) ** 2 + 0.1 * (x[:, 1] - 0.5) ** 2
 
 
-def searched(space, rounds, rng, error=0.01, excess=None, count=4):
+def known_of(designs, values, error, excess=None):
+    """Designs with objectives of known errors; `excess` of a constraint that is known exactly."""
+    none = np.empty((len(designs), 0))
+    broken = none if excess is None else excess(designs)[:, None]
+    errors = np.tile([error, 1e-9][: values.shape[1]], (len(designs), 1))
+    return Known(designs, values, errors, broken, np.full(broken.shape, 1e-3))
+
+
+def space_of(snap=lambda x: x, constraints=0):
+    return Space(BOUNDS, np.eye(2), (None, lambda x: x[:, 0]), np.zeros(constraints), snap)
+
+
+def searched(space, rounds, rng, error=0.01, excess=None):
+    """What is believed after so many rounds of four designs, by turns of the least of both objectives and of the area."""
     designs = space.snap(BOUNDS[:, 0] + rng.random((10, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0]))
 
     def values(x):
@@ -52,28 +63,27 @@ def searched(space, rounds, rng, error=0.01, excess=None, count=4):
 
     table = values(designs)
     for _ in range(rounds):
-        errors = np.tile([error, 0.0], (len(designs), 1))
-        known = Known(designs, table, errors, None if excess is None else excess(designs))
-        more = improvement.proposals(known, space, count, rng)
-        designs, table = np.vstack([designs, more]), np.vstack([table, values(more)])
-    errors = np.tile([error, 0.0], (len(designs), 1))
-    return Known(designs, table, errors, None if excess is None else excess(designs))
-
-
-def space_of(snap=lambda x: x):
-    return Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, lambda x: x[:, 0]), snap)
+        beliefs = Beliefs(known_of(designs, table, error, excess), space, rng)
+        more = []
+        for direction in (*space.directions, None, space.directions[0]):
+            point, worth = improvement.proposed(beliefs, direction)
+            if worth > 0.0:
+                beliefs.take(point)
+                more.append(point)
+        designs = np.vstack([designs, *more])
+        table = np.vstack([table, values(designs[len(table) :])])
+    return Beliefs(known_of(designs, table, error, excess), space, rng)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_least_of_a_noisy_function_is_found_below_its_noise(seed):
-    """34 values with errors of 0.01: a believed end is within 0.004 of the least, and the other end is exact."""
-    rng = np.random.default_rng(seed)
-    known = searched(space_of(), 6, rng)
-    assert ((known.designs >= BOUNDS[:, 0]) & (known.designs <= BOUNDS[:, 1])).all()
-    ends = improvement.finalists(known, space_of(), 8, rng)
-    assert len(ends) <= 8
-    assert bowl(ends).min() < 0.004
-    assert ends[:, 0].min() < 1e-3
+    """34 values with errors of 0.01: the believed end is within 0.004 of the least, and the other end is exact."""
+    found = searched(space_of(), 6, np.random.default_rng(seed))
+    designs = found.known.designs
+    assert ((designs >= BOUNDS[:, 0]) & (designs <= BOUNDS[:, 1])).all()
+    assert bowl(designs[[found.believed[:, 0].argmin()]])[0] < 0.004
+    assert bowl(improvement.expected(found, np.eye(2)[0])[None])[0] < 0.004
+    assert designs[:, 0].min() < 1e-3
 
 
 def steps(x):
@@ -84,57 +94,65 @@ def steps(x):
 
 def test_what_the_first_designs_missed_is_found():
     """Twelve designs show a slope. Where it is lowest a model that is sure of it would place all others."""
-    missed, space = 0, Space(BOUNDS, np.eye(1), np.ones(1), (None,))
+    missed = 0
+    space = Space(BOUNDS, np.eye(1), (None,), np.empty(0))
     for seed in range(6):
         rng = np.random.default_rng([9, seed])
         designs = BOUNDS[:, 0] + rng.random((12, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
         designs = designs[steps(designs) > 0.0]
-        noise = 0.01 * rng.standard_normal((60, 1))
-        for _ in range(14):
+        noise = 0.01 * rng.standard_normal((80, 1))
+        for turn in range(48):
             values = steps(designs)[:, None] + noise[: len(designs)]
-            known = Known(designs, values, np.full(values.shape, 0.01))
-            designs = np.vstack([designs, improvement.proposals(known, space, 3, rng)])
+            beliefs = Beliefs(known_of(designs, values, 0.01), space, rng)
+            far = turn % improvement.EXPLORED == 0
+            point, _ = improvement.farthest(beliefs) if far else improvement.proposed(beliefs, np.ones(1))  # fmt: skip
+            designs = np.vstack([designs, point])
         missed += bool(steps(designs).min() > -0.3)
     assert missed == 0
 
 
-def test_what_may_be_won_shrinks_with_what_is_known():
-    rng = np.random.default_rng(10)
-    few, many = (searched(space_of(), rounds, rng) for rounds in (0, 8))
-    (first, _), (last, least) = (improvement.hopes(one, space_of(), rng) for one in (few, many))
-    assert first.shape == (2,)
-    assert last[1] <= 1e-9  # its least is known and taken
-    assert 0.0 <= last[0] < 0.5 * first[0]
-    assert abs(least[0]) < 0.01
-
-
-def test_designs_that_only_may_be_the_best_are_verified_too():
-    """Beside the best one of those evaluated and of all two others, apart from these and in doubt."""
-    rng = np.random.default_rng(12)
-    designs = BOUNDS[:, 0] + rng.random((30, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    values = bowl(designs)[:, None] + 0.05 * rng.standard_normal((30, 1))
-    known = Known(designs, values, np.full((30, 1), 0.05))
-    space = Space(BOUNDS, np.eye(1), np.ones(1), (None,))
-    ends = improvement.finalists(known, space, 6, rng)
-    fresh = [one for one in ends if not (one == designs).all(axis=1).any()]
-    assert len(fresh) == 3
-    assert bowl(np.array(fresh)).max() < np.median(bowl(designs))
+def test_more_simulations_are_worth_most_where_they_may_change_the_choice():
+    """Of three designs with large errors two compete; what is known exactly, or is out of question, is worth nothing."""
+    rng = np.random.default_rng(4)
+    designs = np.vstack([np.linspace(0.0, 1.0, 8), np.linspace(-2.0, 2.0, 8)]).T
+    values = np.array([1.0, 1.02, 3.0, 3.1, 3.2, 3.1, 3.0, 2.9])[:, None]
+    known = Known(designs, values, np.full((8, 1), 0.3), np.empty((8, 0)), np.empty((8, 0)))
+    beliefs = Beliefs(known, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
+    worth = improvement.replications(beliefs, np.ones(1))
+    assert (worth >= 0.0).all()
+    assert set(np.argsort(worth)[-2:].tolist()) == {0, 1}
+    exact = Known(designs, values, np.full((8, 1), 1e-9), np.empty((8, 0)), np.empty((8, 0)))
+    sure = Beliefs(exact, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
+    assert improvement.replications(sure, np.ones(1)).max() < 0.01 * worth.max()
 
 
 def test_constraints_are_kept():
+    found = searched(space_of(constraints=1), 5, np.random.default_rng(5), excess=lambda x: 0.6 - x[:, 0])  # fmt: skip
+    best = improvement.expected(found, np.eye(2)[0])
+    assert 0.58 < best[0] < 0.66
+    assert (found.known.designs[found.allowed][:, 0] > 0.55).all()
+    safer = improvement.expected(found, np.eye(2)[0], np.array([0.2]))
+    assert safer[0] > best[0] + 0.1
+
+
+def test_where_nothing_keeps_the_constraints_designs_go_towards_them():
     rng = np.random.default_rng(5)
-    known = searched(space_of(), 5, rng, excess=lambda x: 0.6 - x[:, 0])
-    ends = improvement.finalists(known, space_of(), 8, rng)
-    assert (ends[:, 0] > 0.55).all()
-    assert ends[:, 0].min() < 0.66
+    designs = BOUNDS[:, 0] + rng.random((20, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = np.column_stack([bowl(designs), designs[:, 0]])
+    known = known_of(designs, values, 0.01, lambda x: 5.0 + x[:, 1])
+    beliefs = Beliefs(known, space_of(constraints=1), rng)
+    assert not beliefs.allowed.any()
+    point, worth = improvement.proposed(beliefs, np.eye(2)[0])
+    assert worth > 0.0
+    assert point[1] < designs[:, 1].min()
 
 
 def test_only_designs_of_a_catalogue_are_asked_for():
     def snap(x):
         return np.column_stack([np.round(x[:, 0] * 10.0) / 10.0, x[:, 1]])
 
-    known = searched(space_of(snap), 4, np.random.default_rng(6))
-    np.testing.assert_allclose(known.designs[:, 0] * 10.0, np.round(known.designs[:, 0] * 10.0))
+    designs = searched(space_of(snap), 4, np.random.default_rng(6)).known.designs
+    np.testing.assert_allclose(designs[:, 0] * 10.0, np.round(designs[:, 0] * 10.0))
 
 
 # -- a study ----------------------------------------------------------------------------------------
@@ -145,8 +163,6 @@ m3 = { range = [0.07, 0.28] }
 [cases.robust]
 random = ["C"]
 objectives = [{ statistic = "quantile", level = 0.9 }, { formula = "0 - m2 - m3" }]
-[surrogate]
-of = "statistics"
 [verification]
 designs = 4
 infill_rounds = 1
@@ -165,41 +181,13 @@ def done(carried_out):
     return carried_out(study())
 
 
-def test_statistics_are_searched_by_name_or_where_f_is_rough():
-    asked = study().required_study
-    assert by_statistics.applies(asked, 1.0)
-    for of, r2, expected in (("f", 0.1, False), (None, 0.5, True), (None, 0.95, False), (None, np.nan, True)):  # fmt: skip
-        scene = study().with_({"study.surrogate.of": of})
-        assert by_statistics.applies(scene.required_study, r2) is expected
-
-
-def test_a_search_by_statistics_says_what_another_design_may_win():
-    """Few designs with large errors leave much to be won; those of a known function, its least among them, nothing."""
-    scene = study()
-    run = SimpleNamespace(scene=scene, study=scene.required_study)
-    run.rng = lambda *words: np.random.default_rng(13)
-    region = tried.bounds(run, ("m2", "m3"))
-    hoped = "another design is expected to lower the least 90th percentile by"
-    for count, error, text in ((24, 0.3, hoped), (120, 1e-6, "")):
-        unit = np.random.default_rng(14).random((count, 2))
-        unit[:4] = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]
-        where = region[:, 0] + unit * np.ptp(region, axis=1)
-        noise = error * np.random.default_rng(15).standard_normal(count)
-        values = np.column_stack([1.0 + unit[:, 0] + noise, -where.sum(axis=1)])
-        one = tried.Tried(
-            ("m2", "m3"), where, values, np.full(count, -np.inf), np.full((count, 2), error)
-        )
-        assert by_statistics.left(run, "robust", [one]).startswith(text)
-        assert bool(by_statistics.left(run, "robust", [one])) is bool(text)
-
-
-def test_a_search_by_statistics_ends_at_the_front(done):
-    """f rises with both masses: the front ends at their bounds; the swarm's own designs are not verified."""
+def test_a_search_ends_at_the_front(done):
+    """f rises with both masses: the front ends at their bounds; designs of the swarm have no names of their own."""
     found = opened.read(done / "verification.nc", "verification")
     alpha, beta = (found.sel(design=f"robust {end}") for end in ("alpha", "beta"))
     region = box(study(), ("m2", "m3"))
     np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
-    assert float(alpha["first_true"]) == float(found["first_true"].min())
+    assert float(alpha["first_true"]) <= 1.005 * float(found["first_true"].min())  # or lighter
     assert not any("averaged" in name for name in found["design"].to_numpy())
     counted = extent.samples_of(study())
     samples = opened.read(done / "samples.nc", "samples")
@@ -207,7 +195,7 @@ def test_a_search_by_statistics_ends_at_the_front(done):
 
 
 @pytest.mark.nightly
-def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
+def test_a_search_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
     formula.replace_dynamics(monkeypatch.setattr)
     assert formula.run_in_pieces(study(), str(tmp_path / "out"), alone()) > 4
     assert contents(tmp_path / "out") == contents(done)
@@ -215,6 +203,6 @@ def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, t
 
 @pytest.mark.full
 @pytest.mark.mpi
-def test_a_search_by_statistics_has_the_same_bytes_on_two_ranks(done, tmp_path):
+def test_a_search_has_the_same_bytes_on_two_ranks(done, tmp_path):
     """``python -m pytest tests/test_improvement.py -m full``"""
     assert contents(on_two_ranks(study(), tmp_path)) == contents(done)

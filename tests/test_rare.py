@@ -14,9 +14,9 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.merit import recommended
 from hpcclear.scene.points import Points
-from hpcclear.statistics.random import indices, tail
-from hpcclear.statistics.random.importance import OWN, REPEATS, Rare, reach
-from hpcclear.study import edge, rare, verdicts
+from hpcclear.statistics.random import tail
+from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
+from hpcclear.study import rare
 
 # -- indices ----------------------------------------------------------------------------------------
 
@@ -179,22 +179,6 @@ def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
     np.testing.assert_array_equal(second, [np.nan])
 
 
-# -- indices over designs ---------------------------------------------------------------------------
-
-
-def test_draws_of_many_designs_show_level_and_slopes_of_an_index(shift):
-    """f is a plane in u whose level rises with the design: at each the index is the limit less its level, exactly."""
-    rng = np.random.default_rng([7, shift])
-    places, u = rng.uniform(-0.1, 0.1, (8192, 2)), 3.0 + rng.standard_normal(8192)
-    level = places @ [8.0, -4.0]
-    weights = np.exp(4.5 - 3.0 * u)
-    model = indices.fitted(places, np.where(u + level > 3.0, weights, 0.0), 1e-3)
-    ends = np.array([[0.0, 0.0], [0.08, 0.0], [0.0, 0.08], [-0.08, -0.08]])
-    np.testing.assert_allclose(model(ends), 3.0 - ends @ [8.0, -4.0], atol=0.15)
-    nothing = indices.fitted(places, np.zeros(8192), 1e-3)
-    assert (nothing(ends) > 4.0).all()  # no draw fails: safer than what is asked
-
-
 # -- a study ----------------------------------------------------------------------------------------
 
 STUDY = """
@@ -298,19 +282,15 @@ def test_few_simulations_still_show_a_design_at_the_edge(carried_out, shift):
     assert mass["heavy alpha"] == max(mass[name] for name in kept)
     # what is sought is a known part of the allowed probability, and the model may be wrong by a factor of two
     at_most(share["heavy alpha"], 1.0)
-    at_least(share["heavy alpha"], 0.5 * edge.LAST[0])
-    open_ = [name for name, one in verdicts.items() if one == Verdict.UNDECIDED and "cand" in name]
-    assert open_
+    at_least(share["heavy alpha"], 0.2)
+    # lighter ones are left open as they are: they cannot be better
+    open_ = [
+        name
+        for name, one in verdicts.items()
+        if one == Verdict.UNDECIDED and mass[name] > max(map(mass.get, kept))
+    ]
     # an interval that holds 1 within a factor of two; at the edge by the model, which may be as wrong
     assert all(0.25 < share[name] < 4.0 for name in open_)
-
-
-def test_what_simulations_can_show_is_lower_the_more_they_scatter():
-    study = scene_of(FEW).required_study
-    shown = [edge.shown(study, error) for error in (0.0, 0.2, 0.25, 10.0)]
-    assert shown[0] == edge.LAST[1] > shown[1] > shown[2] > shown[3] == edge.LAST[0]
-    upper = reach(0.2, verdicts.level(study.verification, 6, 1024)) * shown[1]
-    assert upper < 1.0 < 2.5 * upper  # of the allowed probability
 
 
 @pytest.mark.full

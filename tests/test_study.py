@@ -23,6 +23,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
+from hpcclear.report.merit import recommended
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.scene import load_scene
@@ -265,7 +266,7 @@ def test_readings_compare_with_the_printed_values(results):
 def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_path):
     place = tmp_path / "pieces"
     stages = formula.run_in_pieces(scene_of(), place, alone())
-    assert stages == 9
+    assert stages == 8
     assert contents(place) == contents(results)
 
 
@@ -294,12 +295,14 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
     monkeypatch.setattr(responses, "simulated", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
-    at_most = ("check", "infill", "verification", "pairs", "chaos") if len(overrides) > 1 else ()
-    for stage in at_most:  # rounds may win nothing, fronts be short
+    at_most = ("search", "verification", "pairs", "chaos") if len(overrides) > 1 else ("chaos",)
+    for stage in at_most:  # rounds may win nothing, fronts be short, ends be one design
         assert 0.5 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]
     assert dict(made) == said
-    assert extent.responses_of(scene) == responded["all"]
+    assert (
+        0.7 * extent.responses_of(scene) < responded["all"] <= extent.responses_of(scene)
+    )  # what is recommended is an end, or not
 
 
 def test_the_share_of_chaos_is_that_of_the_pairs():
@@ -317,7 +320,8 @@ def test_the_share_of_chaos_is_that_of_the_pairs():
 
 def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     found, verified = (opened.read(results / f"{n}.nc") for n in ("chaos", "verification"))
-    assert set(found["design"].to_numpy()) == set(verified["design"].to_numpy())
+    assert recommended(verified) in found["design"]
+    assert set(found["design"].to_numpy()) < set(verified["design"].to_numpy())
     assert (found["chaotic"] == 0.0).all()
     assert (found["chaos_share"] < 1e-10).all()
     files = {"chaos": found, "verification": verified}

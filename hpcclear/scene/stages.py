@@ -97,9 +97,7 @@ class Surrogate(Table):
     """Covariance function: "squared-exponential", the default, for smooth f; or "matern-5/2", twice differentiable, for f with
     kinks. With the latter the swarm averages over 256 points of a Sobol sequence."""
     of: Literal["f", "statistics"] | None = None
-    """Basis of the adaptive refinement. "f": designs that the swarm finds on the surrogate of f. "statistics": models
-    of each objective and constraint over the designs, with expected improvement. Default: "f" if the surrogate of f has
-    R2 of at least 0.9 on new points, else "statistics"."""
+    """Not used: the search by simulation always uses models of each objective and constraint over the designs."""
 
 
 class CertificateOfEffects(Table):
@@ -150,7 +148,8 @@ class Swarm(Table):
 
 
 class MomentAccuracy(Table):
-    """Half-widths of confidence intervals, relative."""
+    """Half-widths of confidence intervals, relative: of the recommended design in what its case asks for, and of the best in
+    each objective. Others are simulated as long as they may be better."""
 
     mean: Share = 0.002
     """Half-width of the mean, relative."""
@@ -198,9 +197,8 @@ class Verification(Table):
     most_samples: Annotated[int, Count(REPLICATES * 4, 2**30)] = 2**14
     """Largest number of simulations of a design, for "qmc"."""
     contest: Annotated[int, Count(1, 2**10)] = 4
-    """Factor on the simulations that the accuracy requires, for "qmc". Designs that may still be optimal within their
-    confidence interval are simulated with up to this factor, unless they are within 0.4 of the target of the lowest
-    value. 1: no factor."""
+    """Factor on the simulations of the best design, for "qmc". Designs that may still be optimal within their confidence
+    interval are simulated with up to this factor, unless they are within 0.4 of the target of the lowest value."""
     samples: Annotated[int, Count(2, 10**9)] | None = None
     """Number of draws per design, for "monte-carlo"; default 10 000."""
     designs: Annotated[int, Count(0, 10**5)] = 10
@@ -212,13 +210,13 @@ class Verification(Table):
     deviation_tolerance: Share = 0.05
     """Relative surrogate error of the standard deviation of alpha and beta above which a warning is printed."""
     infill_rounds: Annotated[int, Count(0, 100)] = 8
-    """Largest number of rounds of adaptive refinement: further designs are simulated where they may change the front.
-    0: only designs of the search are verified."""
+    """Rounds of the search by simulation, at most: further designs are simulated where they may change the front.
+    0: only designs of the swarm are verified."""
     infill_designs: Annotated[int, Count(1, 10**4)] = 12
     """Number of designs of a case in each round."""
-    infill_samples: Annotated[int, Count(REPLICATES * 2, 10**9)] = 256
-    """Largest number of simulations of each of these designs, by randomised Sobol sequences; at most `samples` if that
-    is given."""
+    infill_samples: Annotated[int, Count(REPLICATES * 2, 10**9)] = 512
+    """Largest number of simulations of each of these designs in the search, by randomised Sobol sequences; at most
+    `samples` if that is given. A design begins with 64; only contenders get more."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Clearance of all joints in the compared responses, m; default the clearances of scene and design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2

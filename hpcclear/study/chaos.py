@@ -10,6 +10,7 @@ import numpy as np
 from hpcclear.results import dataset
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -21,6 +22,11 @@ PERTURBATION = 1e-9
 
 SAME = 1e-4
 """Relative difference of a pair that a regular motion stays below."""
+
+
+def designs(study: Study) -> int:
+    """Designs that it is measured of, at most."""
+    return sum(len(case.goals) + 2 for case in study.cases)
 
 
 def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:

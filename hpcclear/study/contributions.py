@@ -38,7 +38,7 @@ def of_designs(
     Parameters
     ----------
     made : sequence of arrays, shape (2, replicates, values)
-        Of `hpcclear.study.truth.doubled`.
+        Of `hpcclear.study.truth.made`.
     drawn : callable
         A design and its f, (replicates, values), to the points they were taken at.
 

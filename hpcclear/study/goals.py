@@ -109,22 +109,6 @@ def beyond(goal: Goal, values: Array) -> float:
     )
 
 
-def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:
-    """What steers a search to the constraints, from values of f of a design, NaN where failed: as `excess`, but of
-    probabilities the shortfall of their index, which is smooth where counts of exceedances are 0 or jump."""
-    values = values if values.ndim == 3 else values[None]
-    known = [own[np.isfinite(own)] for own in (values[one.place] for one in kept)]
-    if any(len(own) < replicates.FEWEST for own in known):
-        return np.nan
-    found = [
-        float(shortfall(one, one.most, own[None])[0])
-        if one.statistic == "exceedance"
-        else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
-        for one, own in zip(kept, known, strict=True)
-    ]
-    return max(found, default=-np.inf)
-
-
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     """An objective or constraint by the surrogate, (n,): f at draws of the random inputs (n, s), design variables (n,) each."""
     if goal.exact:

@@ -1,6 +1,6 @@
 """Robust optimisation of each case: fronts of mean and standard deviation or others, and their ends (eqs. 19 to 23)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -146,6 +146,21 @@ class Choice:
     origin: str = "search"
 
 
+def choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
+    """Designs of a case from sampling coordinates, (n, d), moved to the nearest ones that there are."""
+    names = run.study.design_variables(case)
+    rows = to_physical(run.scene, names, snapped(run.study, names, coordinates))
+    return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+
+
+def distinct(these: Sequence[Choice]) -> list[Choice]:
+    """Of equal designs of a case the first."""
+    found: dict[object, Choice] = {}
+    for choice in these:
+        found.setdefault((choice.case, *choice.design.values()), choice)
+    return list(found.values())
+
+
 def chosen_in_all(study: Study) -> tuple[int, int]:
     """How many designs `extremes` chooses, and `spread` at most; the front of one objective is its end."""
     fronts = sum(len(case.goals) > 1 for case in study.cases)
@@ -198,8 +213,5 @@ def spread(run: StudyRun, fronts: Result) -> list[Choice]:
     return chosen
 
 
-def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
-    names = run.study.design_variables(case)
-    place = snapped(run.study, names, coordinates[None])
-    values = to_physical(run.scene, names, place)[0]
-    return dict(zip(names, values.tolist(), strict=True))
+def _design(run: StudyRun, case: str, coordinates: Array) -> Mapping[str, float]:
+    return choices(run, case, coordinates[None])[0].design

@@ -6,6 +6,7 @@ longer while a verdict is open and `most_samples` allows. A few of their draws a
 that changes is part of the interval. Where plain and weighted samples contradict each other, both count.
 """
 
+import itertools
 from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,12 +16,12 @@ from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.base.verdict import Verdict
+from hpcclear.base.verdict import Verdict, together
 from hpcclear.scene.cases import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
 from hpcclear.scene.stages import Verification
-from hpcclear.statistics.random.importance import REPEATS, Rare
+from hpcclear.statistics.random.importance import REPEATS, Density, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, tolerance, verdicts
 from hpcclear.study.goals import GoalValue
@@ -57,33 +58,76 @@ class FailureEstimate(NamedTuple):
     """Draws behind the probability, without pilots."""
     taken: float
     """What the tolerance takes of it."""
+    density: Density
+    """What was drawn from."""
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
     """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open decided as far as
-    they can be; besides ``rare_samples``, (n,): the simulations that took."""
+    they can be, of designs that can be the best in an objective: the least of it first, until one keeps its constraints.
+    Besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
-    where = [
-        (row, k, Failing(choice, goal, _before(run, choice, true, row, k), true["taken"][row, k]))
-        for row, choice in enumerate(choices)
-        for k, goal in enumerate(run.study.case(choice.case).kept)
-        if verdicts.rare(goal, run.study.verification)
-        and true["verdict"][row, k] == Verdict.UNDECIDED
-    ]
-    many = verdicts.rivals(choices)
-    found = probabilities(
-        run, [one for *_, one in where], [many[row] for row, *_ in where], stage, stage
+    many, tried = verdicts.rivals(choices), set[int]()
+    densities = dict[tuple[str, int], Density]()
+    while rows := _promising(run, choices, true, tried):
+        where = [
+            (row, k, Failing(choices[row], goal, _before(run, choices[row], true, row, k), true["taken"][row, k]))
+            for row in rows
+            for k, goal in enumerate(run.study.case(choices[row].case).kept)
+            if verdicts.rare(goal, run.study.verification)
+            and true["verdict"][row, k] == Verdict.UNDECIDED
+        ]  # fmt: skip
+        tried |= set(rows)
+        keys = [(one.choice.case, k) for _, k, one in where]
+        found = probabilities(
+            run, [one for *_, one in where], [many[row] for row, *_ in where], stage, stage,
+            [densities.get(key) for key in keys],
+        )  # fmt: skip
+        for key, (row, k, one), its in zip(keys, where, found, strict=True):
+            _enter(run, true, row, k, one, its)
+            if not its.density.plain:
+                densities[key] = its.density
+        verdicts.decided(run, choices, true)
+    return true
+
+
+def _promising(
+    run: StudyRun, choices: Sequence[Choice], true: Result, tried: set[int]
+) -> list[int]:
+    """Of each case and objective the undecided design with the least of it of those not tried yet, if a rare failure may leave
+    it open and none that keeps all constraints is less."""
+    found = set[int]()
+    for case in run.study.cases:
+        rows = [k for k, one in enumerate(choices) if one.case == case.name]
+        each = true["verdict"][rows, : len(case.kept)].astype(int).tolist()
+        states = [together(one) for one in each]
+        if not any(verdicts.rare(goal, run.study.verification) for goal in case.kept):
+            continue
+        for column in range(len(case.goals)):
+            own = true["goal"][rows, column]
+            kept = [x for x, state in zip(own, states, strict=True) if state is Verdict.HOLDS]
+            less = [
+                (x, row)
+                for x, row, state in zip(own, rows, states, strict=True)
+                if state is Verdict.UNDECIDED and row not in tried and x < min(kept, default=np.inf)
+            ]
+            if less:
+                found.add(min(less)[1])
+    return sorted(found)
+
+
+def _enter(
+    run: StudyRun, true: Result, row: int, k: int, one: Failing, its: FailureEstimate
+) -> None:
+    """Write what is known of a rare failure into the results of its design."""
+    column = len(run.study.case(one.choice.case).goals) + k
+    _replace(true, row, its.own, ("goal_lower", "goal_upper"), column)
+    _replace(true, row, its.sure, ("sure_lower", "sure_upper"), k)
+    true["goal"][row, column] = np.clip(
+        its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
     )
-    for (row, k, one), its in zip(where, found, strict=True):
-        column = len(run.study.case(one.choice.case).goals) + k
-        _replace(true, row, its.own, ("goal_lower", "goal_upper"), column)
-        _replace(true, row, its.sure, ("sure_lower", "sure_upper"), k)
-        true["goal"][row, column] = np.clip(
-            its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
-        )
-        true["counted"][row, k], true["taken"][row, k] = its.draws, its.taken
-        true["rare_samples"][row] += its.simulations
-    return verdicts.decided(run, choices, true)
+    true["counted"][row, k], true["taken"][row, k] = its.draws, its.taken
+    true["rare_samples"][row] += its.simulations
 
 
 def _before(run: StudyRun, choice: Choice, true: Result, row: int, k: int) -> tuple[int, int]:
@@ -102,22 +146,28 @@ def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], colum
 
 
 def probabilities(
-    run: StudyRun, asked: Sequence[Failing], many: Sequence[int], stage: str, purpose: str
+    run: StudyRun,
+    asked: Sequence[Failing],
+    many: Sequence[int],
+    stage: str,
+    purpose: str,
+    densities: Sequence[Density | None] = (),
 ) -> list[FailureEstimate]:
-    """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long."""
+    """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long; without pilots
+    where `densities` of like designs are known."""
     rates = [
         Rare(
             len(run.study.case(one.choice.case).random),
             _limit(one),
             NEGLIGIBLE * one.goal.most,
             one.before,
+            known,
         )
-        for one in asked
+        for one, known in itertools.zip_longest(asked, densities)
     ]
-    begun = [
-        one.prepared(run.rng("rare", purpose, "pilot")) for one in rates
-    ]  # all meet the same draws
-    _together(run, asked, begun, stage)
+    unknown = [k for k, one in enumerate(rates) if one.density is None]
+    begun = [rates[k].prepared(run.rng("rare", purpose, "pilot")) for k in unknown]
+    _together(run, [asked[k] for k in unknown], begun, stage)  # all meet the same draws
     open_, round_ = list(range(len(asked))), 0
     while open_:
         rngs = [_streams(run, purpose, round_) for _ in open_]
@@ -139,6 +189,7 @@ def probabilities(
             one.simulations,
             one.draws,
             its.taken if one.plain else one.taken(its.goal.most),
+            one.drawn_from,
         )
         for its, one, number in zip(asked, rates, many, strict=True)
     ]

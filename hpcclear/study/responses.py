@@ -28,16 +28,15 @@ STATISTICS = ("mean", "fluctuation", "peak")
 
 
 def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
-    """Names and designs whose responses are compared: the baseline design, alpha, beta (and further ends) of each case."""
-    known = {choice.name: choice for choice in designs}
-    cases = run.study.cases
-    original = known[f"{cases[0].name} original"]
-    return [("original", original), *((name, known[name]) for case in cases for name in case.ends)]
+    """Names and designs whose responses are compared, of those that decide: the baseline design of one case, and all others."""
+    name = f"{run.study.cases[0].name} original"
+    original = next(one for one in designs if one.name == name)
+    return [("original", original), *((one.name, one) for one in designs if one.origin == "search")]
 
 
 def simulations(study: Study) -> int:
     """Single responses: each and its copies are simulated for their statistics, and it for its file."""
-    return (study.verification.response_copies + 1) * (1 + ends_in_all(study))
+    return (study.verification.response_copies + 1) * (1 + ends_in_all(study) + len(study.cases))
 
 
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:

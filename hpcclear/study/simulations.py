@@ -17,8 +17,6 @@ from hpcclear.scene.points import Points, check_points
 from hpcclear.study import loads as loading
 
 SHOWN = {
-    "check": "designs of the search",
-    "infill": "refinement",
     "pairs": "runs at two tolerances",
     "chaos": "perturbed runs",
 }

@@ -3,6 +3,7 @@
 Resuming, announcements, plans and the files of a finished study all go by this one list.
 """
 
+import itertools
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -14,18 +15,15 @@ from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
-    by_f,
-    by_statistics,
     certificate,
     chaos,
     contributions,
-    edge,
     fronts,
     lives,
     optimisation,
     rare,
-    refinement,
     responses,
+    search,
     sensitivities,
     surrogates,
     tolerance,
@@ -35,7 +33,6 @@ from hpcclear.study import (
     worst,
 )
 from hpcclear.study.certificate import Extent
-from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper import claims, readings
 from hpcclear.study.paper.printed import printed_designs, printed_moments
@@ -87,6 +84,11 @@ class Verified(NamedTuple):
     true: Result
     remarks: list[str]
 
+    @property
+    def deciding(self) -> list[Choice]:
+        """The named designs that a decision is between."""
+        return list(itertools.compress(self.table.choices, self.table.deciding))
+
 
 def _sensitivity(run: StudyRun) -> Result:
     result = run.stage("sensitivity", sensitivities.analyse)
@@ -107,9 +109,11 @@ def _search(run: StudyRun, models: Models) -> SearchOutcome:
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
-    statistics = by_statistics.applies(run.study, surrogates.checked_r2(run.study, models.kept))
-    better, remarks = refinement.search(run, [*ends, *between], statistics)
-    designs = better if better and statistics else [*ends, *(better or between)]
+    result = run.stage("search", search.search, [*ends, *between])
+    papers = ends if is_the_papers(run.scene) else []
+    better = search.found_in(run, result)
+    designs = optimisation.distinct([*papers, *better]) if better else [*ends, *between]
+    remarks = [str(text) for text in result["remarks"]]
     return SearchOutcome(
         [*designs, *verification.original(run), *printed_designs(run.scene)], remarks
     )
@@ -120,10 +124,11 @@ def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verifi
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
     remarks = list(found.remarks)
-    text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
+    text, more = tolerance.reached(run, true, table)
     if run.study.paired:
         run.notify(text)
     remarks += more
+    remarks += verification.undecided(run, table.choices, true)
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
         run.notify(text)
@@ -149,14 +154,13 @@ def _worst(run: StudyRun, verified: Verified) -> None:
 
 
 def _chaos(run: StudyRun, verified: Verified) -> None:
-    scatter = run.stage("chaos", chaos.simulate, verified.designs)
-    rows = verified.table.rows
-    chaos.write(run, verified.table.choices, {name: one[rows] for name, one in scatter.items()})
+    choices = verified.deciding
+    chaos.write(run, choices, run.stage("chaos", chaos.simulate, choices))
 
 
 def _responses(run: StudyRun, verified: Verified) -> Result:
-    series = run.stage("responses", responses.simulate_all, verified.table.choices)
-    responses.write(run, verified.table.choices)
+    series = run.stage("responses", responses.simulate_all, verified.deciding)
+    responses.write(run, verified.deciding)
     return series
 
 
@@ -177,9 +181,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 
 def _of_search(scene: Scene) -> dict[str, int]:
-    # a search by statistics has no more in all: what it has beside these its verification saves
-    begun, rounds = by_f.simulations(scene.required_study)
-    return {"check": begun, "infill": rounds, "edge": refinement.at_edges(scene.required_study)}
+    return {"search": sum(search.simulations(scene.required_study))}
 
 
 def _designs(scene: Scene) -> int:
@@ -187,8 +189,8 @@ def _designs(scene: Scene) -> int:
     study = scene.required_study
     found = sum(optimisation.chosen_in_all(study))
     if study.verification.infill_rounds:
-        found += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
-        found += edge.designs(study)
+        papers = optimisation.chosen_in_all(study)[0] * is_the_papers(scene)
+        found = papers + sum(search.designs(study, case) for case in study.cases)
     return found + len(study.cases) + len(printed_designs(scene))  # the original, in each case
 
 
@@ -208,7 +210,7 @@ def _of_lives(scene: Scene) -> dict[str, int]:
 
 
 def _of_chaos(scene: Scene) -> dict[str, int]:
-    return {"chaos": _designs(scene) * 2 * chaos.PAIRS}
+    return {"chaos": chaos.designs(scene.required_study) * 2 * chaos.PAIRS}
 
 
 def _of_readings(scene: Scene) -> dict[str, int]:
@@ -241,9 +243,7 @@ STAGES = (
         "search", _search, needs=("surrogates",),
         words={
             "optimisation": "search on the surrogate",
-            "check": "simulation of its designs",
-            "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints",
+            "search": "search by simulation",
         },
         writes=("front",), samples=_of_search,
     ),
@@ -320,14 +320,11 @@ class Announcer:
 
     def announced(self, name: str) -> None:
         """Write which stage begins, and how long the study has taken so far."""
-        kind, _, round_ = name.partition("-")
+        kind = name.partition("-")[0]
         for number, words in enumerate(self._counted, 1):
             if kind in words:
-                again = f", round {int(round_) + 1}" if kind == "infill" else ""
                 spent = duration(time.monotonic() - self._began)
-                text = (
-                    f"stage {number} of {len(self._counted)}: {words[kind]}{again} ({spent} so far)"
-                )
+                text = f"stage {number} of {len(self._counted)}: {words[kind]} ({spent} so far)"
                 print(plain(text), file=sys.stderr, flush=True)
 
     @staticmethod

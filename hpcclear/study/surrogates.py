@@ -180,11 +180,6 @@ def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
 
 
-def checked_r2(study: Study, result: Mapping[str, np.ndarray]) -> float:
-    """R2 (a scalar) on fresh points of the model that is searched, in a result of `fit_all`."""
-    return float(result[f"model{len(study.models) - 1}_check"][_CHECKS.index("r2")])
-
-
 def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     """Write kriging.nc: a row for each subinterval's model, of whatever kind."""
     leaves = [(k, leaf) for k, model in enumerate(models) for leaf in model.leaves]

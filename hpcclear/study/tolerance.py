@@ -301,11 +301,12 @@ def _widened(
     return verdicts.decided(run, designs, true)
 
 
-def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, list[str]]:
-    """What verified designs reached of the accuracy, in a sentence; and what a reader should know, a sentence each."""
+def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tuple[str, list[str]]:
+    """What designs that decide reached of the accuracy, in a sentence; and what a reader should know, a sentence each."""
     wanted = np.array([run.study.wanted.mean, run.study.wanted.deviation])
     moments = ("mean", "deviation")
     within = np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in moments])
+    within = within[table.deciding]
     worst = np.nanmax(within, axis=0, initial=0.0)
     share, doubt = (np.nanmax(true[name], axis=0) for name in ("tolerance", "tolerance_error"))
     tight, _ = stricter(run.scene)
@@ -330,15 +331,15 @@ def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, lis
         remarks.append(
             f"Chaotic motion hides the error of the integration tolerance: its standard error is {_percents(doubt)}."
         )
+    texts = verification.short_of_accuracy(run, table, true)
     missed = [
-        name
-        for name, row in zip(names, within, strict=True)
-        if not (row <= verification.ROUND_OFF * wanted).all()
+        f"{one.name}: {text}"
+        for one, text, best in zip(table.choices, texts, table.recommended, strict=True)
+        if text and best
     ]
     if run.study.paired and missed and not (share > limit).any():
         remarks.append(
-            f"{len(missed)} of {len(names)} designs did not reach the target, {missed[0]} among them. "
-            "Raise study.verification.most_samples."
+            f"The accuracy requested was not reached by {'; '.join(missed)}. Raise study.verification.most_samples."
         )
     return text, remarks
 

@@ -1,18 +1,29 @@
 """Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
+from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
-from hpcclear.scene.cases import Constraint
+from hpcclear.base.student import student
+from hpcclear.base.verdict import Verdict
+from hpcclear.report.merit import SPAN
+from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
-from hpcclear.statistics.search.certainty import Compared
+from hpcclear.statistics.random.replicates import (
+    Estimate,
+    limits,
+    moments,
+    quantile,
+    spread,
+)
+from hpcclear.statistics.search import improvement
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
@@ -20,8 +31,16 @@ from hpcclear.study.run import Result, StudyRun
 FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
-TIED = 0.4
-"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
+LOOK = 16
+"""Points of each replicate of every verified design, at most; those that decide get more."""
+
+TIED, LOST = 0.4, 0.1
+"""Of the accuracy requested: designs that differ by less are one in an objective; and what is lost beyond that, as a rule, by
+taking one for the best in place of another, for more simulations to be worth it; all of it for all that a design may have."""
+
+UNDECIDED = 0.3
+"""Of the same: what all simulations that a design may have are expected to win, at least, of one that may be shown to keep its
+constraints."""
 
 CLOSE = 0.25
 """Of the accuracy requested: what a constraint that is not decided is known to, unless it is a probability."""
@@ -63,11 +82,9 @@ def _of_design(
 
 
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
-    """The first points of each replicate of designs, (k, replicates, values) each as `doubled` returns them."""
-    made = [nothing(run)] * len(choices)
-    length = first_length(run.study.verification)
-    lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
-    return made
+    """The first points of each replicate of designs, (k, replicates, values) each as `made` returns them."""
+    length = min(first_length(run.study.verification), search_length(run.study), LOOK)
+    return looked_at(run, choices, "verification", "verification", length)
 
 
 def made(
@@ -76,7 +93,11 @@ def made(
     before: Sequence[Array] = (),
     wanted: Sequence[MomentAccuracy] = (),
 ) -> list[Array]:
-    """f of designs, by as many simulations as the study requires, (2, replicates, values) each as `doubled` returns them.
+    """Simulations of designs, as many as the study requires, (k, replicates, values) each: f, whether beyond
+    Hertz's range, further responses.
+
+    Only those that decide are simulated further: in each objective the least is known as accurately as the study (or `wanted`
+    of each design) requires, and others are simulated as long as choosing it may lose more than `LOST`.
 
     Raises
     ------
@@ -86,9 +107,13 @@ def made(
     settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
         return drawn(run, choices, stage, stage, settings.draws)
-    length, most = first_length(settings), settings.most_samples
-    found = doubled(run, choices, stage, stage, length, most, before, wanted)
-    return contested(run, choices, found, stage, stage)
+    found = list(before) or begun(run, choices)
+    wanted = wanted or [run.study.wanted] * len(choices)
+    while rows := _open(run, choices, found, wanted):
+        length = min(found[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
+        rows = [k for k in rows if found[k].shape[2] == length]
+        lengthen(run, choices, found, rows, stage, stage, length)
+    return found
 
 
 def drawn(
@@ -140,38 +165,13 @@ def expected(study: Study) -> int:
     return int(np.clip(needed, first_length(settings) * REPLICATES, settings.most_samples))
 
 
-def sequences(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
-) -> Result:
-    """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
-    return results_of(run, choices, doubled(run, choices, stage, purpose, length, most))
-
-
-def doubled(
-    run: StudyRun,
-    choices: Sequence[Choice],
-    stage: str,
-    purpose: str,
-    length: int,
-    most: int,
-    before: Sequence[Array] = (),
-    wanted: Sequence[MomentAccuracy] = (),
+def looked_at(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int
 ) -> list[Array]:
-    """Objectives and whether beyond Hertz's range, (k, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study or `wanted` of each requires) or beyond `most` simulations; `before` is continued."""
-    wanted = wanted or [run.study.wanted] * len(choices)
-    made = list(before) or [nothing(run)] * len(choices)
-    many = verdicts.rivals(choices)
-    while True:
-        rows = [
-            k for k, one in enumerate(made)
-            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one, wanted[k], many[k]))
-        ]  # fmt: skip
-        if not rows:
-            return made
-        first = min(made[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
-        rows = [k for k in rows if made[k].shape[2] == first]
-        lengthen(run, choices, made, rows, stage, purpose, first or length)
+    """f of designs by so many points of each scrambled Sobol sequence, (k, replicates, values) each."""
+    made = [nothing(run)] * len(choices)
+    lengthen(run, choices, made, range(len(choices)), stage, purpose, length)
+    return made
 
 
 def lengthen(
@@ -183,7 +183,7 @@ def lengthen(
     purpose: str,
     length: int,
 ) -> None:
-    """So many points more of each replicate of some designs that are equally long; `made` as `doubled` returns it, shape
+    """So many points more of each replicate of some designs that are equally long; `made` as `made` returns it, shape
     (2, replicates, values) each."""
     first = made[rows[0]].shape[2]
     fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
@@ -191,48 +191,96 @@ def lengthen(
         made[k] = np.concatenate([made[k], one], axis=2)
 
 
-def contested(
-    run: StudyRun, choices: Sequence[Choice], made: list[Array], stage: str, purpose: str
-) -> list[Array]:
-    """Designs doubled further while the ends of a front are not decided, the shortest first; `made`, shape (2, replicates,
-    values) each, as `doubled` returns it."""
-    settings = run.study.verification
-    most = [min(one[0].size * settings.contest, settings.most_samples) for one in made]
-    while True:
-        rows = [k for k in _contenders(run, choices, made) if 2 * made[k][0].size <= most[k]]
-        if not rows:
-            return made
-        length = min(made[k].shape[2] for k in rows)
-        rows = [k for k in rows if made[k].shape[2] == length]
-        lengthen(run, choices, made, rows, stage, purpose, length)
-
-
-def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> list[int]:
-    """Designs of the search that may be the best in an objective for all that is known, though not as good as the least to
-    within `TIED`; and that least."""
-    settings, found = run.study.verification, set[int]()
+def _open(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    made: Sequence[Array],
+    wanted: Sequence[MomentAccuracy],
+) -> list[int]:
+    """Designs that more simulations are worth: in each objective, and in mean + 2 standard deviations where both are
+    minimised, the least of those that keep the constraints, unless it is known well enough; and others without which more
+    than `LOST` is lost as a rule, up to `contest` times its simulations. Where none is decided yet, the least of those that are
+    likely shown to keep them. The baseline, which all are compared with, is known as accurately or gets as many as these."""
+    settings, many, found = run.study.verification, verdicts.rivals(choices), set[int]()
     for case in run.study.cases:
-        rows = [
-            k for k, one in enumerate(choices) if one.case == case.name and one.origin == "search"
-        ]
+        rows = [k for k, c in enumerate(choices) if (c.case, c.origin) == (case.name, "search")]
         if not rows:
             continue
-        estimates = [_goals(run, choices[k], made[k])[: len(case.goals)] for k in rows]
+        count = len(case.goals)
+        estimates = [_goals(run, choices[k], made[k])[:count] for k in rows]
         values = np.array([[one.value for one in row] for row in estimates])
-        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in estimates]), 1, 0)
-        less = Compared(values, shifts, settings.confidence).less
-        for column, goal in enumerate(case.goals):
-            share, relative = goals.wanted(goal, run.study.wanted)
-            own = values[:, column]
-            if not np.isfinite(own).any():
+        shifts = np.array([[one.shifts for one in row] for row in estimates])
+        chances = np.array([_shown(run, choices[k], made[k], many[k]) for k in rows])
+        length = np.array([made[k][0].size for k in rows]) / settings.most_samples
+        known = np.isfinite(values).all(axis=1) & (chances > 0.0)
+        holds, open_ = known & (chances == 1.0), known & (chances < 1.0) & (length <= 0.5)
+        directions = np.eye(count) if not case.plain else np.vstack([[1.0, SPAN], np.eye(count)])
+        leaders = set[int]()
+        for number, direction in enumerate(directions):
+            own, moved = values @ direction, np.einsum("nkr,k->nr", shifts, direction)
+            if holds.any():
+                least = int(np.where(holds, own, np.inf).argmin())
+            elif open_.any():
+                likely = open_ & (chances >= min(0.5, chances[open_].max()))
+                least = int(np.where(likely, own, np.inf).argmin())
+            else:
                 continue
-            least = int(np.nanargmin(own))
-            near = TIED * share * (abs(own[least]) if relative else 1.0)
-            far = ~less[column][least] & (own > own[least] + near)
-            found |= {rows[k] for k in np.flatnonzero(far)} | (
-                {rows[least]} if far.any() else set()
-            )
-    return sorted(found)
+            first, asked = rows[least], None if number == 0 else direction
+            if not _accurate(run, choices[first], made[first], wanted[first], many[first], asked):
+                found.add(first)
+            leaders.add(first)
+            error = spread(moved - moved[least])
+            size = size_of(run, case, direction, values[least])
+            below = own[least] - np.where(holds, TIED * size, 0.0)
+            lost = np.where(known, chances * improvement.gain(below, own, error), 0.0)
+            worth = np.where(holds, np.maximum(LOST, length), UNDECIDED * (1.0 - length))
+            rivals = (holds | open_) & (lost > worth * size)
+            rivals[least] = False
+            if (rivals & (error > 0.0)).any():
+                found.add(first)
+            limit = settings.contest * made[first][0].size
+            found |= {k for k in compress(rows, rivals & holds) if 2 * made[k][0].size <= limit}
+            if (rivals & open_).any():  # when it is decided others may win less
+                found.add(rows[int(np.where(rivals & open_, lost, 0.0).argmax())])
+        most = max((made[k][0].size for k in leaders), default=0)
+        found |= {
+            k
+            for k, one in enumerate(choices)
+            if one.name == f"{case.name} original"
+            and made[k][0].size < most
+            and not _accurate(run, one, made[k], wanted[k], many[k])
+        }
+    return sorted(k for k in found if 2 * made[k][0].size <= settings.most_samples)
+
+
+def size_of(run: StudyRun, case: Case, direction: Array, values: Array) -> float:
+    """The accuracy requested of a weighted sum of objectives, (m,), at a design; of a formula that of a mean."""
+    sizes = []
+    for goal, value in zip(case.goals, values, strict=True):
+        share, relative = goals.wanted(goal, run.study.wanted)
+        share = run.study.wanted.mean if goal.exact else share
+        sizes.append(share * (abs(value) if relative else 1.0))
+    return float(abs(direction) @ np.array(sizes))
+
+
+def _shown(run: StudyRun, choice: Choice, values: Array, many: int) -> float:
+    """Probability that a design will be shown to keep its constraints as one of `many`: 1 and 0 where that is decided; rare
+    failures are decided later."""
+    settings, count, chance = run.study.verification, values[0].size, 1.0
+    sure, last = (verdicts.level(settings, many, n) for n in (count, settings.most_samples))
+    for goal in run.study.case(choice.case).kept:
+        if verdicts.rare(goal, settings):
+            continue
+        one = goals.goal_value(goal, values, choice.design, sure)
+        verdict = verdicts.of_interval(goal, one, count, sure).verdict
+        if verdict is Verdict.FAILS:
+            return 0.0
+        if verdict is Verdict.UNDECIDED:
+            freedom, left = REPLICATES - 1, min(count / settings.most_samples, 0.99)
+            error = (one.upper - one.lower) / (2.0 * student(sure, freedom))
+            gap = goal.most - one.value - student(last, freedom) * error * left**0.5
+            chance *= float(np.clip(ndtr(gap / (error * (1.0 - left) ** 0.5)), 1e-9, 1.0 - 1e-9))
+    return chance
 
 
 def _values(
@@ -266,27 +314,39 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 
 
 def _accurate(
-    run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
+    run: StudyRun,
+    choice: Choice,
+    values: Array,
+    wanted: MomentAccuracy,
+    many: int,
+    direction: Array | None = None,
 ) -> bool:
-    """Whether all confidence intervals are as narrow as requested. A standard deviation of round-off is, and so is what
-    significantly keeps or breaks its threshold, as one of `many` designs. Others are simulated further until decided."""
+    """Whether the confidence intervals of the objectives in a direction, or of all, are as narrow as requested. A standard
+    deviation of round-off is, and so is what significantly keeps or breaks its threshold, as one of `many` designs."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
     reach = _reaches(settings, values[0])
-    good = reach[0] <= wanted.mean * abs(mean)
-    good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
-    if good and not case.plain:
-        good = all(
-            goals.accurate(goal, one, wanted, 1.0 if goal.statistic == "exceedance" else CLOSE)
-            or verdicts.settled(goal, values, choice, settings, many)
-            if isinstance(goal, Constraint)
-            else goals.accurate(goal, one, wanted)
-            for goal, one in zip(
-                (*case.goals, *case.kept), _goals(run, choice, values), strict=True
-            )
-            if not goal.exact and not (goal in case.kept and verdicts.rare(goal, settings))
-        )
-    return bool(good)
+    first = {
+        "mean": reach[0] <= wanted.mean * abs(mean),
+        "deviation": reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean)),
+    }
+    weights = np.ones(len(case.goals)) if direction is None else direction
+    values_of = zip((*case.goals, *case.kept), _goals(run, choice, values), strict=True)
+    for k, (goal, one) in enumerate(values_of):
+        if isinstance(goal, Constraint):
+            part = 1.0 if goal.statistic == "exceedance" else CLOSE
+            good = goal.exact or verdicts.rare(goal, settings)
+            good = good or goals.accurate(goal, one, wanted, part)
+            good = good or verdicts.settled(goal, values, choice, settings, many)
+        elif goal.exact or not weights[k]:
+            continue
+        elif goal.place == 0 and goal.statistic in first:
+            good = first[goal.statistic]
+        else:
+            good = goals.accurate(goal, one, wanted)
+        if not good:
+            return False
+    return True
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
@@ -317,9 +377,8 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
         then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``taken`` (by the tolerance), ``counted``, ``verdict``
-        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``beyond`` (n, constraints): of `hpcclear.study.goals.beyond`; ``samples``, ``failed``,
-        ``beyond_hertz``.
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``beyond`` (n, constraints): of
+        `hpcclear.study.goals.beyond`; ``samples``, ``failed``, ``beyond_hertz``.
     """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
@@ -352,7 +411,6 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         missing = [np.nan] * (held - len(kept))
         row["taken"] = [0.0] * len(certain) + missing
         row["counted"] = [float(values.size)] * len(certain) + missing
-        row["excess"] = goals.steered(kept, whole, choice.design)
         row["beyond"] = [goals.beyond(goal, whole) for goal in kept] + missing
         row["sure_lower"] = [one.lower for one in certain] + missing
         row["sure_upper"] = [one.upper for one in certain] + missing

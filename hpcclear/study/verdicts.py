@@ -142,11 +142,6 @@ def usual_in(case: Case, settings: Verification) -> int:
     return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
 
 
-def fewest_in(case: Case, settings: Verification) -> int:
-    """The same of a design that is far from all thresholds."""
-    return sum(FEWEST for one in case.kept if rare(one, settings))
-
-
 def costs(study: Study, unit: str) -> Iterator[str]:
     """What each probability that is kept small takes of a design, a sentence each."""
     settings = study.verification

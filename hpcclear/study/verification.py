@@ -9,11 +9,13 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best, together
 from hpcclear.report.constraints import ABSENT
+from hpcclear.report.merit import SPAN
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import bound_at, shares
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import truth
 from hpcclear.study.goals import excess, most_of, names_of, wanted
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
@@ -62,6 +64,29 @@ def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecew
     return [f"Surrogate errors of mean and standard deviation: {found}. Use the simulated values."]
 
 
+def undecided(run: StudyRun, choices: Sequence[Choice], true: Result) -> list[str]:
+    """The best undecided design of each case where it would be better than all that keep the constraints, in words."""
+    texts = []
+    for case in run.study.cases:
+        goal, met = case.goals[0], dict[Verdict, list[tuple[float, int]]]()
+        for row, one in enumerate(choices):
+            if case.kept and one.case == case.name:
+                state = together(true["verdict"][row, : len(case.kept)].astype(int).tolist())
+                met.setdefault(state, []).append((float(true["goal"][row, 0]), row))
+        kept, (value, row) = (
+            min(met.get(Verdict.HOLDS, [(np.nan, 0)])),
+            min(met.get(Verdict.UNDECIDED, [(np.inf, 0)])),
+        )
+        if value < kept[0]:
+            won = f"{(kept[0] - value) / abs(kept[0]):.2g}" if kept[0] else f"{kept[0] - value:.2g}"
+            words, price = goal.words(run.scene.objective.unit), np.nanmax(true["price"][row])
+            needs = f"; about {price:.0f} simulations would decide" if np.isfinite(price) else ""
+            texts.append(
+                f"{choices[row].name} is undecided and would lower the {words} by {won} of its value{needs}."
+            )
+    return texts
+
+
 @dataclass(frozen=True)
 class NamedDesigns:
     """Verified designs under their names.
@@ -77,12 +102,18 @@ class NamedDesigns:
         All designs of its case that it is statistically indistinguishable from.
     dominated : list of bool
         Whether another design of its case is significantly better in all that the case makes small.
+    deciding : list of bool
+        Whether a decision is between it and others: the baseline, the ends of the front, and what is recommended.
+    recommended : list of bool
+        Whether it is recommended in its case.
     """
 
     choices: list[Choice]
     rows: list[int]
     equivalent: list[list[str]]
     dominated: list[bool]
+    deciding: list[bool]
+    recommended: list[bool]
 
 
 def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> NamedDesigns:
@@ -91,9 +122,10 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> NamedDesign
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and standard deviation, if
     nothing else is requested; gamma, delta and epsilon of further ones. Of designs that are indistinguishable from it at the
     study's confidence it is the best in the others. Each design of the front is significantly better than each
-    other in one of them. They are chosen among the designs that significantly satisfy all constraints, if there are any.
+    other in one of them; among them stands the recommended one (`hpcclear.report.merit`). They are chosen among the designs
+    that significantly satisfy all constraints, if there are any.
     """
-    table = NamedDesigns([], [], [], [])
+    table = NamedDesigns([], [], [], [], [], [])
     for case in run.study.cases:
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
         _name_case(run, case, rows, choices, true, table)
@@ -117,12 +149,16 @@ def _name_case(
         broken = _broken(case, true)[rows]
         each = true["verdict"][rows, : len(kept)].astype(int).tolist()
         ours = _nearest(ours, [together(one) for one in each], broken)
-    mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
+    least = np.nanmin(values[ours], axis=0, initial=np.inf)
+    near = np.array([truth.size_of(run, case, one, least) for one in np.eye(count)])
+    mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence, near)
     known = mine.known.any()
     ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count
     front = mine.front(run.study.verification.designs + count) if known else []
+    merit = values[:, 0] + SPAN * values[:, 1] if case.plain else values[:, 0]
+    recommended = min(ours, key=lambda k: float(merit[k])) if known else ends[0]
     inner = sorted(
-        (ours[k] for k in front if ours[k] not in ends), key=lambda k: float(values[k, 0])
+        {*(ours[k] for k in front), recommended} - {*ends}, key=lambda k: float(values[k, 0])
     )
     named = [*zip(ends, case.ends, strict=True)]
     named += [(k, f"{case.name} front {number + 1}") for number, k in enumerate(inner)]
@@ -132,6 +168,7 @@ def _name_case(
     named += [
         (k, choices[rows[k]].name or f"{case.name} candidate {unnamed.index(k) + 1}") for k in left
     ]
+    best_name = next(name for k, name in named if k == recommended)
     for k, name in named:
         table.choices.append(replace(choices[rows[k]], name=name))
         table.rows.append(rows[k])
@@ -139,6 +176,8 @@ def _name_case(
             [label for j, label in named if everything.one[j, k] and label != name]
         )
         table.dominated.append(bool(everything.beaten[k]))
+        table.recommended.append(name == best_name)
+        table.deciding.append(name in (f"{case.name} original", *case.ends, best_name))
 
 
 def _nearest(rows: Sequence[int], verdicts: Sequence[Verdict], broken: Array) -> list[int]:
@@ -216,30 +255,24 @@ def _broken(case: Case, true: Result) -> Array:
     return excess(case.kept, true["goal"][:, count : count + size], true["beyond"][:, :size])
 
 
-def _missed(run: StudyRun, table: NamedDesigns, true: Result) -> Array:
-    """Of each design what is known less well than the accuracy of the study, "mean ± 0.4 % (requested 0.2 %)"."""
-    accuracy, unit = run.study.wanted, run.scene.objective.unit
-    texts = []
+def short_of_accuracy(run: StudyRun, table: NamedDesigns, true: Result) -> list[str]:
+    """Of each design which objectives are known less well than the accuracy of the study, "mean ± 0.4 % (requested 0.2 %)"."""
+    unit, texts = run.scene.objective.unit, []
     for k, choice in enumerate(table.choices):
-        known = [
-            ("mean", true["mean_reach"][k] / abs(true["mean"][k]), accuracy.mean),
-            ("standard deviation", true["deviation_reach"][k] / true["deviation"][k], accuracy.deviation),
-        ]  # fmt: skip
+        known = []
         for column, goal in enumerate(run.study.case(choice.case).goals):
-            if goal.exact or goal.usual in (Usual.MEAN, Usual.DEVIATION):
-                continue
             half = (true["goal_upper"][k, column] - true["goal_lower"][k, column]) / 2.0
-            share, relative = wanted(goal, accuracy)
-            half /= abs(true["goal"][k, column]) if relative else 1.0
-            known.append((goal.words(unit), half, share))
-        texts.append(
-            ", ".join(
-                f"{words} ± {100.0 * half:.2g} % (requested {100.0 * share:.2g} %)"
-                for words, half, share in known
-                if half > ROUND_OFF * share
-            )
-        )
-    return np.array(texts)
+            if goal.usual in (Usual.MEAN, Usual.DEVIATION):
+                half = true[f"{goal.statistic}_reach"][k]
+            share, relative = wanted(goal, run.study.wanted)
+            size = abs(true["goal"][k, column]) if relative else 1.0
+            if not goal.exact and half > ROUND_OFF * share * size > 0.0:
+                half /= size
+                words = "standard deviation" if goal.usual is Usual.DEVIATION else goal.words(unit)
+                words = "mean" if goal.usual is Usual.MEAN else words
+                known.append(f"{words} ± {100.0 * half:.2g} % (requested {100.0 * share:.2g} %)")
+        texts.append(", ".join(known))
+    return texts
 
 
 def write(
@@ -299,7 +332,7 @@ def write(
     names = np.array([choice.name for choice in choices])
     data["equivalence"] = np.array([np.isin(names, alike) for alike in table.equivalent], np.int8)
     if study.paired:
-        data["accuracy_missed"] = _missed(run, table, true)
+        data["accuracy_missed"] = np.array(short_of_accuracy(run, table, true))
     data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
     data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])

@@ -158,7 +158,11 @@ def _covariance(u: Array, share: Array, centre: Array) -> Array:
 
 
 def pilot(
-    dimensions: int, limit: float, rng: np.random.Generator, negligible: float = 0.0
+    dimensions: int,
+    limit: float,
+    rng: np.random.Generator,
+    negligible: float = 0.0,
+    draws: int = PILOT,
 ) -> Generator[Array, Array, Density]:
     """Yield draws u, (n, d), take f there, (n,), NaN where it failed, and return a density near where f exceeds the limit, or
     a lower level whose probability is `negligible` already; the inputs' own one where neither is reached and that is about as
@@ -166,7 +170,7 @@ def pilot(
     density = Density(np.ones(1), np.zeros((1, dimensions)), WIDE**2 * np.eye(dimensions)[None])
     reached, last = -np.inf, False
     for _ in range(LEVELS):
-        u = density.draw(PILOT, rng)
+        u = density.draw(draws, rng)
         f = yield u
         known = np.isfinite(f)
         if known.sum() < 4 * dimensions:
@@ -237,11 +241,10 @@ class Rare:
         self, length: int, rngs: Sequence[np.random.Generator]
     ) -> Generator[Array, Array, None]:
         """Yield `length` draws more of each repeat, and take f there."""
-        assert self.density is not None  # after the pilot
-        draws = [self.density.draw(length, rng) for rng in rngs]
+        draws = [self.drawn_from.draw(length, rng) for rng in rngs]
         f = yield np.concatenate(draws)
         self.simulations += len(f)
-        weights = np.array([self.density.weights(u) for u in draws])
+        weights = np.array([self.drawn_from.weights(u) for u in draws])
         if not self.f.size:
             self._first = np.concatenate([u[:PAIRED] for u in draws])
         self.f = np.concatenate([self.f, f.reshape(REPEATS, length)], axis=1)
@@ -274,6 +277,12 @@ class Rare:
         # a bias that chance may have made counts for nothing
         bias = np.sqrt(max(apart.mean() ** 2 - error**2, 0.0)) / (1.0 - left)
         self.factor = float(min(1.0 + bias / least, MOST)) if least > 0.0 else MOST
+
+    @property
+    def drawn_from(self) -> Density:
+        """What is drawn from, once that is known."""
+        assert self.density is not None  # after the pilot
+        return self.density
 
     @property
     def plain(self) -> bool:

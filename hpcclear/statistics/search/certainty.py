@@ -18,6 +18,8 @@ class Compared:
         Influence of each replicate (`hpcclear.statistics.random.replicates.Estimate`).
     confidence : float
         Level of each comparison.
+    near : array, shape (m,), or None
+        By how much designs may differ in each objective to be called equally good, however little is known of them.
 
     Attributes
     ----------
@@ -25,8 +27,10 @@ class Compared:
         Whether design i is significantly less than design j in an objective.
     """
 
-    def __init__(self, values: Array, shifts: Array, confidence: float) -> None:
-        self.values = values
+    def __init__(
+        self, values: Array, shifts: Array, confidence: float, near: Array | None = None
+    ) -> None:
+        self.values, self._near = values, near
         self.less = np.stack(
             [surely_less(one, its, confidence) for one, its in zip(values.T, shifts, strict=True)]
         )
@@ -63,6 +67,8 @@ class Compared:
         for k in earlier:
             least = int(np.where(level, self.values[:, k], np.inf).argmin())
             level = level & ~self.less[k][least]
+            if self._near is not None:
+                level &= self.values[:, k] <= self.values[least, k] + self._near[k]
             level[least] = True
         return int(np.where(level, self.values[:, last], np.inf).argmin())
 

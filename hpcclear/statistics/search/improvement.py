@@ -1,23 +1,24 @@
-"""Where to evaluate next, by expected improvement: for objectives that are costly and known with errors.
+"""What another simulation is worth, where objectives and constraints are costly and known with errors.
 
-Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic.
-So each objective gets one Kriging model over designs, with the kernel of Matern and a noise variance near that of the known
-errors: a model that is free to fit noise as ripples finds what flatters it. The next designs are those that are expected
-to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs
-at a time each takes those before it for evaluated, at the value that is expected (Kriging believer).
+Each objective and constraint gets one Kriging model over designs, with the kernel of Matern and the known error of each value:
+a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
+probability that it keeps the constraints; more simulations of a known design are worth what they may change in which design is
+taken for the best (knowledge gradient). Both are compared by simulation: few for a new design at first, more for
+contenders only ("replication or exploration"). Of several designs at a time each takes those before it for evaluated, at
+the value that is expected (Kriging believer).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
-kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the
-sum over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
-optimization" (2016), doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10
-(2006), doi:10.1109/TEVC.2005.851274.
+kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4;
+M. Binois, J. Huang, R. B. Gramacy and M. Ludkovski, "Replication or exploration? Sequential design for stochastic simulation
+experiments", Technometrics 61 (2019), doi:10.1080/00401706.2018.1469433; the sum over strips M. Emmerich, K. Yang, A. Deutz,
+H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global optimization" (2016),
+doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10 (2006),
+doi:10.1109/TEVC.2005.851274.
 """
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import moocore
 import numpy as np
@@ -25,37 +26,35 @@ from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.statistics.search.infill import NEAR, eligible
-from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.kriging import Kriging
 
-NOISE = 0.1, 2.0
+NOISE = 1e-3, 2.0
 """Between these factors on the variance of known errors is the noise variance of a model. Designs that meet the same scatter
-share part of their errors, which then is no noise between them."""
+share most of their errors, which then are no noise between them."""
 
-LENGTHS = (0.1, 1.0)
-"""Length scales in the unit cube: a statistic that changes faster is not found by some ten designs per variable. Of few designs
-with errors the likelihood takes any function for a plane, and what looks known is never visited."""
+LENGTHS = (0.1, 3.0)
+"""Length scales in the unit cube: a statistic that changes faster is not found by some ten designs per variable."""
 
-HEDGES = 2
-"""Designs to verify that only may be the best: what is believed of those that are near each other is off together."""
+EXPLORED = 5
+"""One new design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
 
-EXPLORED = 3
-"""One design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
-
-WIDE, STEPS, LOCAL, CENTRES = 1024, (0.2, 0.06, 0.02, 0.006), 96, 4
+WIDE, STEPS, LOCAL, CENTRES = 512, (0.2, 0.06, 0.02, 0.006), 64, 2
 """Candidates all over the box, and about each of the best designs at each of these parts of the ranges."""
+
+NEAR = 3e-3
+"""Largest difference of coordinates, in the unit cube, below which two designs are one."""
 
 DRAWS = 64
 """Draws of three or more objectives for an expected improvement without a closed form."""
 
 LIKELY = 0.5
-"""Probability of keeping the constraints from which a design that was not evaluated may be the best."""
+"""Probability of keeping the constraints from which a design may be the best."""
 
 Exact = Callable[[Array], Array]
 Snap = Callable[[Array], Array]
+Merit = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -65,18 +64,17 @@ class Known:
     Attributes
     ----------
     designs : array, shape (n, d)
-    values : array, shape (n, m)
-        Objectives, all minimised; NaN where they failed.
-    errors : array, shape (n, m)
-        Their standard errors.
-    excess : array, shape (n,), or None
-        By how much each breaks the constraints, at most 0 where it keeps them; NaN where it failed.
+    values, errors : array, shape (n, m)
+        Objectives, all minimised, NaN where they failed; their standard errors.
+    excess, excess_errors : array, shape (n, c)
+        By how much each constraint is broken, at most 0 where it is kept; standard errors.
     """
 
     designs: Array
     values: Array
     errors: Array
-    excess: Array | None = None
+    excess: Array
+    excess_errors: Array
 
 
 @dataclass(frozen=True)
@@ -87,24 +85,31 @@ class Space:
     ----------
     bounds : array, shape (d, 2)
     directions : array, shape (k, m)
-        Weights of the objectives in each sum whose least value counts.
-    merit : array, shape (m,)
-        Those of the sum that counts most.
+        Weights of the objectives in each sum whose least value counts; the first is what counts most.
     exact : sequence of functions or None, length m
         Objectives that are known as functions of designs, (n, d) to (n,).
+    margins : array, shape (c,)
+        By how much each constraint is to be kept at least, so that it can be shown.
     snap : function
         Designs (n, d) to the nearest ones that there are: values from a catalogue, say.
     """
 
     bounds: Array
     directions: Array
-    merit: Array
     exact: Sequence[Exact | None]
+    margins: Array
     snap: Snap = lambda designs: designs
 
 
 class Beliefs:
-    """Models of all objectives and of the excess over designs.
+    """Models of all objectives and constraints over designs.
+
+    Attributes
+    ----------
+    believed : array, shape (n, m)
+        Objectives of the designs that were evaluated.
+    allowed : array, shape (n,)
+        Which of them are likely to keep the constraints.
 
     Raises
     ------
@@ -113,20 +118,21 @@ class Beliefs:
     """
 
     def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
-        self.known, self.space = known, space
+        self.known, self.space, self.rng = known, space, rng
         self.models = [
             None if exact else _fitted(known.designs, values, errors, space.bounds, rng)
             for values, errors, exact in zip(
                 known.values.T, known.errors.T, space.exact, strict=True
             )
         ]
-        self.excess = None
-        if known.excess is not None:
-            unknown = np.full(len(known.excess), np.nan)
-            self.excess = _fitted(known.designs, known.excess, unknown, space.bounds, rng)
+        self.limits = [
+            _fitted(known.designs, values, errors, space.bounds, rng)
+            for values, errors in zip(known.excess.T, known.excess_errors.T, strict=True)
+        ]
         self.pending = known.designs[:0]
-        self.allowed = eligible(known.values, known.excess)
-        self.believed = self.means(known.designs)[self.allowed]
+        self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
+        self.believed = self.means(known.designs)
+        self.allowed = self.finite & (self.feasible(known.designs) >= LIKELY)
 
     def means(self, points: Array) -> Array:
         """What is expected at points, (n, d) to (n, m)."""
@@ -142,154 +148,153 @@ class Beliefs:
             [nothing if model is None else model.variance(points) for model in self.models]
         )
 
+    def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
+        """By how much constraints are expected to be broken, margins included, and standard deviations, (n, c) each."""
+        margins = self.space.margins if margins is None else margins
+        none = np.empty((len(points), 0))
+        means = [one.predict(points)[:, None] for one in self.limits]
+        spreads = [np.sqrt(one.variance(points))[:, None] for one in self.limits]
+        return np.hstack([none, *means]) + margins, np.hstack([none, *spreads]) + 1e-12
+
     def feasible(self, points: Array) -> Array:
         """Probability of keeping the constraints, (n, d) to (n,)."""
-        if self.excess is None:
-            return np.ones(len(points))
-        deviation = np.sqrt(self.excess.variance(points)) + 1e-12
-        return np.asarray(ndtr(-self.excess.predict(points) / deviation))
+        means, spreads = self.shortfalls(points)
+        return np.asarray(ndtr(-means / spreads).prod(axis=1))
 
     def take(self, point: Array) -> None:
         """A design as if it were evaluated, at what is expected of it."""
         self.models = [None if one is None else _extended(one, point) for one in self.models]
-        if self.excess is not None:
-            self.excess = _extended(self.excess, point)
+        self.limits = [_extended(one, point) for one in self.limits]
         self.pending = np.vstack([self.pending, point])
-        if self.excess is None or self.excess.predict(point[None])[0] <= 0.0:
-            self.believed = np.vstack([self.believed, self.means(point[None])])
+
+    def front(self) -> Array:
+        """Objectives of all designs that are likely to keep the constraints, also of those that are to be evaluated, (k, m)."""
+        later = self.pending[self.feasible(self.pending) >= LIKELY]
+        return np.vstack([self.believed[self.allowed], self.means(later)])
 
 
 def _fitted(
     designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
 ) -> Kriging:
-    scale = float(np.nanstd(values))
-    share = (
-        float(np.nanmedian(errors)) / scale if scale > 0.0 and np.isfinite(errors).any() else 0.0
-    )
-    low, high = (max(factor * share**2, 1e-8) for factor in NOISE)
-    noise = (low, max(high, 10.0 * low)) if share else None
+    known = np.isfinite(values)
+    size = float(np.std(values[known])) if known.any() else 0.0
+    with np.errstate(invalid="ignore"):
+        squares = np.where(errors > 0.0, errors, np.nan)[known] ** 2
+    if not (size > 0.0 and np.isfinite(squares).any()):
+        return fit_kriging(designs, values, bounds, rng=rng, restarts=1, kernel=MATERN)
+    middle = float(np.nanmedian(squares))
+    shares = np.ones(len(values))
+    shares[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
+    low, high = (max(factor * middle / size**2, 1e-8) for factor in NOISE)
+    limits = low, max(high, 10.0 * low)
     return fit_kriging(
-        designs, values, bounds, rng=rng, restarts=2, lengths=LENGTHS, kernel=MATERN, noise=noise
+        designs,
+        values,
+        bounds,
+        rng=rng,
+        restarts=1,
+        lengths=LENGTHS,
+        kernel=MATERN,
+        noise=limits,
+        shares=shares,
     )
 
 
 def _extended(model: Kriging, point: Array) -> Kriging:
     """A model with one more value, the one that it expects: which changes no other expectation, and has no weight."""
+    shares = None if model.shares is None else np.append(model.shares, np.median(model.shares))
     return replace(
         model,
         inputs=np.vstack([model.inputs, point]),
         values=np.append(model.values, model.predict(point[None])),
         alpha=np.append(model.alpha, 0.0),
+        shares=shares,
     )
 
 
-def proposals(known: Known, space: Space, count: int, rng: np.random.Generator) -> Array:
-    """Designs to evaluate next, at most `count`, shape (k, d).
-
-    Raises
-    ------
-    InputError
-        Too few designs for a model.
-    """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1, user_api="blas"):  # the same bits, and faster
-        beliefs = Beliefs(known, space, rng)
-        turns = itertools.cycle([*space.directions, None])
-        chosen: list[Array] = []
-        failed = 0
-        while len(chosen) < count and failed < len(space.directions) + 2:
-            explores = (len(known.designs) + len(chosen)) % EXPLORED == 0 and not failed
-            merit = partial(_unvisited, beliefs) if explores else _merit(beliefs, next(turns), rng)
-            point, worth = _best(beliefs, merit, rng)
-            if worth > 0.0:
-                chosen.append(point)
-                beliefs.take(point)
-            failed = 0 if worth > 0.0 else failed + 1
-        return np.reshape(chosen, (-1, len(space.bounds)))
+def proposed(beliefs: Beliefs, direction: Array | None) -> tuple[Array, float]:
+    """The new design, (d,), that is expected to win most in a direction, or of the hypervolume; and how much."""
+    return _best(beliefs, _merit(beliefs, direction))
 
 
-def hopes(known: Known, space: Space, rng: np.random.Generator) -> tuple[Array, Array]:
-    """What another design is expected to win in each direction, and the least that is believed there, shape (k,) each.
-
-    Raises
-    ------
-    InputError
-        Too few designs for a model.
-    """
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1, user_api="blas"):
-        beliefs = Beliefs(known, space, rng)
-        gains = [_best(beliefs, _merit(beliefs, one, rng), rng)[1] for one in space.directions]
-        return np.array(gains), (beliefs.believed @ space.directions.T).min(axis=0)
+def farthest(beliefs: Beliefs) -> tuple[Array, float]:
+    """The design, (d,), that is farthest from all that are known, where constraints are likely kept; and how far."""
+    return _best(
+        beliefs,
+        lambda points: np.where(
+            _apart(points, beliefs), _distance(beliefs, points) * beliefs.feasible(points), 0.0
+        ),
+    )
 
 
-def finalists(known: Known, space: Space, most: int, rng: np.random.Generator) -> Array:
-    """Designs that are believed to be the best, shape (k, d): in each direction of those evaluated and of all; `HEDGES` others
-    that may be; and of the front of what is expected of those evaluated as many as spread best, up to so many in all.
+def expected(beliefs: Beliefs, direction: Array, margins: Array | None = None) -> Array:
+    """The design, (d,), that is expected to be the best in a direction of those that keep the constraints by some margins."""
 
-    Raises
-    ------
-    InputError
-        Too few designs for a model.
-    """
-    from threadpoolctl import threadpool_limits
+    def merit(points: Array) -> Array:
+        broken = np.maximum(beliefs.shortfalls(points, margins)[0], 0.0).max(axis=1, initial=0.0)
+        return np.where(broken > 0.0, -1e30 * (1.0 + broken), -(beliefs.means(points) @ direction))
 
-    with threadpool_limits(limits=1, user_api="blas"):
-        beliefs = Beliefs(known, space, rng)
-        designs, means = known.designs[beliefs.allowed], beliefs.believed
-        found = []
-        for direction in space.directions:
-            found.append(designs[(means @ direction).argmin()])
-            point, worth = _best(beliefs, _likely(beliefs, direction), rng)
-            if worth > 0.0:
-                found.append(point)
-        merit = _merit(beliefs, space.merit, rng)
-        for _ in range(HEDGES):
-            point, worth = _best(beliefs, merit, rng)
-            if worth > 0.0:
-                found.append(point)
-                beliefs.take(point)
-        front = np.flatnonzero(moocore.is_nondominated(means))
-        if (left := most - len(found)) >= means.shape[1]:
-            found += list(designs[front[cut(means[front], left)]])
-        return np.unique(np.array(found), axis=0)
+    return _best(beliefs, merit)[0]
 
 
-def _likely(beliefs: Beliefs, direction: Array) -> Callable[[Array], Array]:
-    """How far what is expected at points lies below that of those evaluated, where constraints are likely kept."""
-    least = float((beliefs.believed @ direction).min())
+def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0) -> Array:
+    """What twice the simulations of each known design are worth in a direction, (n,): by how much they are expected to better
+    the choice of the best design. `apart` are errors of their differences from the best that no model sees, (n,)."""
+    rows = np.flatnonzero(beliefs.allowed)
+    found = np.zeros(len(beliefs.known.designs))
+    if len(rows) < 2:
+        return found
+    designs, own = beliefs.known.designs[rows], beliefs.believed[rows] @ direction
+    left = beliefs.variances(designs) @ direction**2
+    noise = np.zeros(len(rows))
+    for column, (model, weight) in enumerate(zip(beliefs.models, direction, strict=True)):
+        if model is not None and weight:
+            places = np.cumsum(np.isfinite(beliefs.known.values[:, column])) - 1
+            shares = 1.0 if model.shares is None else model.shares[places[rows]]
+            noise += weight**2 * model.scale**2 * model.noise_variance * shares
+    unseen = np.broadcast_to(apart, len(found))[rows] ** 2 / 2.0
+    moved = np.sqrt(left**2 / (left + noise + 1e-300) + unseen)
+    order = np.argsort(own)
+    others = np.where(np.arange(len(own)) == order[0], own[order[1]], own[order[0]])
+    worth = gain(others, own, moved) - np.maximum(others - own, 0.0)
+    chance = beliefs.feasible(designs)
+    found[rows] = worth * chance + np.maximum(others - own, 0.0) * (1.0 - chance)
+    return found
 
-    def function(points: Array) -> Array:
-        won = least - beliefs.means(points) @ direction
-        return np.where(beliefs.feasible(points) >= LIKELY, won, -np.inf)
 
-    return function
-
-
-def _merit(
-    beliefs: Beliefs, direction: Array | None, rng: np.random.Generator
-) -> Callable[[Array], Array]:
+def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
     """What is expected to be won at points, (n, d) to (n,): in a direction, or of the hypervolume."""
-    weights = rng.dirichlet(np.ones(beliefs.believed.shape[1]))
-    noise = rng.standard_normal((DRAWS, 1, beliefs.believed.shape[1]))
+    front = beliefs.front()
+    if not len(front):  # nothing keeps the constraints: the nearest, by the worst of them
+        means, _ = beliefs.shortfalls(beliefs.known.designs[beliefs.finite])
+        least = float(means.max(axis=1).min(initial=np.inf))
+
+        def nearer(points: Array) -> Array:
+            means, spreads = beliefs.shortfalls(points)
+            rows = np.arange(len(points)), means.argmax(axis=1)
+            return gain(np.full(len(points), least), means[rows], spreads[rows]) * _apart(
+                points, beliefs
+            )
+
+        return nearer
+    weights = beliefs.rng.dirichlet(np.ones(front.shape[1]))
+    noise = beliefs.rng.standard_normal((DRAWS, 1, front.shape[1]))
 
     def function(points: Array) -> Array:
         mean, deviation = beliefs.means(points), np.sqrt(beliefs.variances(points))
         if direction is not None:
             own, spread = mean @ direction, np.sqrt(deviation**2 @ direction**2)
-            won = gain(float((beliefs.believed @ direction).min()), own, spread)
-        elif beliefs.believed.shape[1] == 2:
-            won = volume(beliefs.believed, mean, deviation)
+            won = gain((front @ direction).min(), own, spread)
+        elif front.shape[1] == 2:
+            won = volume(front, mean, deviation)
         else:
-            won = _scalarised(beliefs.believed, mean + deviation * noise, weights)
+            won = _scalarised(front, mean + deviation * noise, weights)
         return won * beliefs.feasible(points) * _apart(points, beliefs)
 
     return function
 
 
-def gain(least: float, mean: Array, deviation: Array) -> Array:
+def gain(least: Array | float, mean: Array, deviation: Array) -> Array:
     """Expected amount by which normal numbers stay below `least`, (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = (least - mean) / deviation
@@ -333,11 +338,9 @@ def _scalarised(front: Array, drawn: Array, weights: Array) -> Array:
     return np.asarray(np.maximum(distance(front).min() - distance(drawn), 0.0).mean(axis=0))
 
 
-def _best(
-    beliefs: Beliefs, merit: Callable[[Array], Array], rng: np.random.Generator
-) -> tuple[Array, float]:
+def _best(beliefs: Beliefs, merit: Merit) -> tuple[Array, float]:
     """The candidate of most merit, (d,), moved by smaller and smaller steps while that helps; and its merit."""
-    space = beliefs.space
+    space, rng = beliefs.space, beliefs.rng
     low, width = space.bounds[:, 0], space.bounds[:, 1] - space.bounds[:, 0]
     points = [low + rng.random((WIDE, len(low))) * width]
     for centre in _centres(beliefs):
@@ -350,18 +353,22 @@ def _best(
     return place, worth
 
 
-def _most(points: Array, merit: Callable[[Array], Array]) -> tuple[Array, float]:
+def _most(points: Array, merit: Merit) -> tuple[Array, float]:
     worth = merit(points)
     row = int(worth.argmax())
     return points[row], float(worth[row])
 
 
 def _centres(beliefs: Beliefs) -> Array:
-    """The best designs in each direction, (k, d)."""
-    designs = np.vstack([beliefs.known.designs[beliefs.allowed], beliefs.pending])
-    means = beliefs.means(designs)
+    """The best designs in each direction, (k, d); those nearest to the constraints where none keeps them."""
+    known, kept = beliefs.known.designs, beliefs.allowed
+    if not kept.any():
+        means, _ = beliefs.shortfalls(known)
+        broken = np.where(beliefs.finite, means.max(axis=1, initial=0.0), np.inf)
+        return known[np.argsort(broken, kind="stable")[:CENTRES]]
+    means = beliefs.believed[kept]
     rows = np.unique([np.argsort(means @ one)[:CENTRES] for one in beliefs.space.directions])
-    return np.asarray(designs[rows])
+    return np.asarray(known[kept][rows])
 
 
 def _about(centre: Array, step: float, space: Space, rng: np.random.Generator) -> Array:
@@ -383,10 +390,3 @@ def _distance(beliefs: Beliefs, points: Array) -> Array:
     others = np.vstack([beliefs.known.designs, beliefs.pending])
     steps = cdist(points / width, others / width, "chebyshev")
     return np.asarray(steps.min(axis=1))
-
-
-def _unvisited(beliefs: Beliefs, points: Array) -> Array:
-    """The same where designs likely keep the constraints; 0 of those that were evaluated."""
-    return np.where(
-        _apart(points, beliefs), _distance(beliefs, points) * beliefs.feasible(points), 0.0
-    )

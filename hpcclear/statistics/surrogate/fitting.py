@@ -56,6 +56,7 @@ def fit_kriging(
     lengths: tuple[float, float] = LENGTH_BOUNDS,
     kernel: Kernel = SQUARED_EXPONENTIAL,
     noise: tuple[float, float] | None = None,
+    shares: np.ndarray | None = None,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -79,6 +80,8 @@ def fit_kriging(
         "squared-exponential" or "matern-5/2".
     noise : (float, float), optional
         Between which the noise variance is, in units of the variance of the values.
+    shares : (n,) array, optional
+        Noise variance of each value over that one, where the errors of values are known; else they are all alike.
 
     Returns
     -------
@@ -99,12 +102,14 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
+    known = np.ones(len(values)) if shares is None else np.asarray(shares, dtype=np.float64)
+    normalised, limits = (outcomes - mean) / scale, noise or NOISE_BOUNDS
     found = _maximise_likelihood(
-        unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel, noise or NOISE_BOUNDS
+        unit, normalised, rng, restarts, lengths, kernel, limits, known[valid]
     )
     return Kriging(
-        labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs,
-        values=values[valid], dropped=int((~valid).sum()), kernel=kernel,
+        labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],
+        dropped=int((~valid).sum()), kernel=kernel, shares=None if shares is None else known[valid],
     )  # fmt: skip
 
 
@@ -116,6 +121,7 @@ def _maximise_likelihood(
     lengths: tuple[float, float],
     kernel: Kernel,
     noise: tuple[float, float],
+    shares: np.ndarray,
 ) -> Fitted:
     """Length scales, variances and alpha, of normalised data in the unit cube."""
     from threadpoolctl import threadpool_limits
@@ -126,4 +132,6 @@ def _maximise_likelihood(
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):
-        return maximise(unit, normalised, start, bounds, restarts, seed, kernel=kernel)
+        return maximise(
+            unit, normalised, start, bounds, restarts, seed, kernel=kernel, shares=shares
+        )

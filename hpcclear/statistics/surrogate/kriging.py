@@ -64,6 +64,8 @@ class Kriging:
         Samples that had failed (NaN) and were left out of the fit.
     kernel : str
         One of `hpcclear.statistics.surrogate.kernels.KERNELS`.
+    shares : (n,) array, optional
+        Noise variance of each training value over `noise_variance`; not stored, for no prediction needs it.
     """
 
     names: tuple[str, ...]
@@ -79,6 +81,7 @@ class Kriging:
     alpha: np.ndarray
     dropped: int = 0
     kernel: Kernel = SQUARED_EXPONENTIAL
+    shares: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "length_scales", "inputs", "values", "alpha"):
@@ -184,7 +187,8 @@ class Kriging:
         """Covariance of the training values, in units of ``scale**2``."""
         unit = self.to_unit(self.inputs)
         matrix = self._covariance(unit, unit)
-        matrix[np.diag_indices_from(matrix)] += self.noise_variance
+        shares = 1.0 if self.shares is None else self.shares
+        matrix[np.diag_indices_from(matrix)] += self.noise_variance * shares
         return matrix
 
     def _covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:

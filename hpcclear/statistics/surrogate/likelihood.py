@@ -66,6 +66,7 @@ def maximise(
     seed: int,
     *,
     kernel: Kernel = SQUARED_EXPONENTIAL,
+    shares: Array | float = 1.0,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values at points.
 
@@ -83,25 +84,30 @@ def maximise(
         Further starts.
     seed : int
         Of these.
+    shares : array, shape (n,)
+        Noise variance of each value over the one that is sought.
     """
+    shares = np.broadcast_to(shares, len(values))
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
     starts = [np.log(start)]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
     if len(parts) == 1:
-        top = _climbed(starts, centred, values, limits, kernel)
+        top = _climbed(starts, centred, values, limits, kernel, shares)
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
-        top = _climbed(starts, centred[parts[0]], values[parts[0]], limits, kernel)
+        top = _climbed(
+            starts, centred[parts[0]], values[parts[0]], limits, kernel, shares[parts[0]]
+        )
         top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
         for part in parts[1:]:
-            top = _climbed([top], centred[part], values[part], limits, kernel)
+            top = _climbed([top], centred[part], values[part], limits, kernel, shares[part])
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
-    covariance[np.diag_indices_from(covariance)] += best[-1]
+    covariance[np.diag_indices_from(covariance)] += best[-1] * shares
     factor, _ = dpotrf(covariance, lower=1)
     alpha, _ = dpotrs(factor, values, lower=1)
     return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
@@ -119,14 +125,19 @@ def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
 
 
 def _climbed(
-    starts: list[Array], centred: Array, values: Array, limits: Array, kernel: Kernel
+    starts: list[Array],
+    centred: Array,
+    values: Array,
+    limits: Array,
+    kernel: Kernel,
+    shares: Array,
 ) -> Array:
     """The best that is found from these starts, logarithms as in `negative_likelihood`, shape (d + 2,)."""
     from scipy.optimize import minimize  # only fitting needs it
 
     found = [
         minimize(
-            lambda theta: negative_likelihood(theta, centred, values, kernel),
+            lambda theta: negative_likelihood(theta, centred, values, kernel, shares),
             one,
             method="L-BFGS-B",
             jac=True,
@@ -138,7 +149,11 @@ def _climbed(
 
 
 def negative_likelihood(
-    theta: Array, centred: Array, values: Array, kernel: Kernel = SQUARED_EXPONENTIAL
+    theta: Array,
+    centred: Array,
+    values: Array,
+    kernel: Kernel = SQUARED_EXPONENTIAL,
+    shares: Array | float = 1.0,
 ) -> tuple[float, Array]:
     """Minus the log likelihood, and its gradient.
 
@@ -149,6 +164,8 @@ def negative_likelihood(
     centred : array, shape (n, d)
         Points.
     values : array, shape (n,)
+    shares : array, shape (n,)
+        As `maximise` takes them.
 
     Returns
     -------
@@ -165,7 +182,7 @@ def negative_likelihood(
     )
     smooth, slopes = with_slopes(exponents, theta[0], kernel)
     covariance = smooth.copy()
-    covariance[np.diag_indices(count)] += noise
+    covariance[np.diag_indices(count)] += noise * shares
     # LAPACK and BLAS take the transpose without a copy, and touch its lower triangle only
     factor, failed = dpotrf(covariance.T, lower=1, overwrite_a=1, clean=0)
     if failed:
@@ -173,7 +190,7 @@ def negative_likelihood(
     alpha, _ = dpotrs(factor, values, lower=1)
     logarithm = np.log(np.diag(factor)).sum()
     inverse, _ = dpotri(factor, lower=1, overwrite_c=1)
-    noisy = noise * (alpha @ alpha - np.trace(inverse))
+    noisy = noise * float((shares * (alpha**2 - np.diag(inverse))).sum())
     weights = dsyr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)  # K^-1 - alpha alpha'
     weights *= slopes.T
     table = np.column_stack([scaled, ones])
