@@ -109,7 +109,10 @@ def _rod(scene: SceneTables) -> Iterator[str]:
 
 def _joints(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
-        joint, key = scene.clearance_joint(name), scene.materials_key(name)
+        joint, key = (
+            scene.clearance_joint(name),
+            scene.path_in_scene(f"mechanism.joints.{name}.materials"),
+        )
         for part in ("bearing", "journal"):
             modulus = getattr(joint.materials, part).youngs_modulus
             if not SOFTEST <= modulus <= STIFFEST:

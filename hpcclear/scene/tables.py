@@ -166,10 +166,9 @@ class SceneTables(Table):
         """How many waves bearings and journals have around them at most: in the scene, or as wear makes them."""
         found = {"bearing": 0, "journal": 0}
         tables = [self.clearance_joint(name) for name in self.clearance_joints()]
+        waved = [t.out_of_round for t in tables if t.out_of_round is not None]
         for surface in found:
-            shapes = [
-                getattr(t.out_of_round, surface) for t in tables if t.out_of_round is not None
-            ]
+            shapes = [getattr(one, surface) for one in waved]
             found[surface] = max((s.given() for s in shapes if s is not None), default=0)
             worn = [t.wear for t in tables if t.wear is not None and getattr(t.wear, surface)]
             if self.wear is not None and worn:
@@ -242,10 +241,6 @@ class SceneTables(Table):
     def joint_key(self, label: str) -> str:
         """Dotted path of the table of a joint, or of a contact's joint."""
         return self.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}")
-
-    def materials_key(self, label: str) -> str:
-        """Dotted path of the table that has the materials of a joint with clearance."""
-        return self.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}.materials")
 
     def joint_frictions(self) -> dict[str, tuple[str, float]]:
         """Words and coefficient of friction in joints without clearance, by the dotted paths of its tables."""

@@ -71,7 +71,8 @@ def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
 
 def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
     """Numbers of a contact's samples by the names of `declared.JOINT`, (m,)."""
-    key, materials = scene.joint_key(label), scene.materials_key(label)
+    key = scene.joint_key(label)
+    materials = scene.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}.materials")
     shape = shape_of(scene, get, label)
     clearance, bearing, journal = shape.radii
     moduli, ratios = (
