@@ -14,7 +14,8 @@ from pathlib import Path
 from recorded import record
 
 from hpcclear.dynamics.planar.problem import poses_at_start
-from hpcclear.report import save, sketch_figure
+from hpcclear.report import sketch_figure
+from hpcclear.report.figures.style import render
 from hpcclear.report.html.content import read
 from hpcclear.report.screens import screen_of
 from hpcclear.scene import load_scene
@@ -63,7 +64,7 @@ def main(results: Path) -> None:
         scene = load_scene(ROOT / "jobs" / "linkages" / f"{name}.toml")
         picture = PAGE.parent.parent / "images" / "gallery" / f"{name}.png"
         picture.parent.mkdir(exist_ok=True)
-        save(sketch_figure(scene, poses_at_start(scene)), picture)
+        picture.write_bytes(render(sketch_figure(scene, poses_at_start(scene)), dpi=150))
         columns = {"answer": lines_of(results / name)}
         if name in LINES:
             place = results / f"{name}_line"

@@ -16,8 +16,9 @@ from recorded import record
 from hpcclear import load_scene, simulate
 from hpcclear.base.outcome import Flag
 from hpcclear.dynamics.planar.problem import poses_at_start
-from hpcclear.report import save, sketch_figure
+from hpcclear.report import sketch_figure
 from hpcclear.report.figures.labels import quantity
+from hpcclear.report.figures.style import render
 
 ROOT = Path(__file__).parent.parent
 PICTURES = ROOT / "docs" / "images" / "machines"
@@ -233,7 +234,8 @@ def main():
     for name in MACHINES:
         scene = scene_of(name)
         turned = 0.0 if scene.template is None else 1.0
-        save(sketch_figure(scene, poses_at_start(scene, turned)), PICTURES / f"{name}.png")
+        figure = sketch_figure(scene, poses_at_start(scene, turned))
+        (PICTURES / f"{name}.png").write_bytes(render(figure, dpi=150))
         measure(name)
 
 

@@ -22,6 +22,9 @@ from hpcclear.cli import cli
 from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 
+sys.path.insert(0, str(ROOT / "analysis"))
+import start_page
+
 BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
 SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
@@ -167,6 +170,17 @@ def test_measured_results_fill_the_pages(page):
         parsed = MarkdownIt().enable("table").parse(hooks.table(match[1]))
         assert sum(token.type == "tr_open" for token in parsed) > 1, match[1]
         assert hooks.table(match[1]) in shown
+
+
+@pytest.mark.parametrize("page", start_page.PAGES, ids=lambda page: page.name)
+def test_start_pages_begin_with_a_film_and_a_sentence_with_the_numbers_of_its_file(page):
+    """`python analysis/start_page.py` makes both anew."""
+    text = page.read_text(encoding="utf-8")
+    assert text == start_page.filled(page)
+    places = [text.index(f"images/{start_page.FILM.name}"), start_page.PLACE.search(text).start()]
+    assert places == sorted(places)
+    assert places[1] < text.index("| you want to | read |") < text.index("\n## ")
+    assert start_page.FILM.stat().st_size < 600_000
 
 
 class Site(HTMLParser):

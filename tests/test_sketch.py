@@ -4,15 +4,24 @@ import itertools
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from click.testing import CliRunner
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from own_engine import engine
 
+from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import sketch_figure
+from hpcclear.report.figures import motion, moving
+from hpcclear.report.figures.drawing import CHANGED, draw
 from hpcclear.report.figures.placed import Placed
+from hpcclear.report.figures.sketch import changes
+from hpcclear.report.html.page import write_report
+from hpcclear.results.content import Results
 from hpcclear.scene import load_scene
 from hpcclear.scene.slider_crank import DRAWN_AT
 
@@ -199,3 +208,37 @@ def test_a_linkage_is_drawn_where_it_was_put_together():
         assert {row.name for row in rows} <= said
     assert "300 rpm" in "\n".join(said)
     assert axes.get_aspect() == 1.0
+
+
+def test_parts_that_differ_from_another_design_are_coloured_with_their_change(tmp_path):
+    changed = {"mechanism.rod.mass": 0.3, "mechanism.crank.length": 0.05}
+    scene, other = engine(study=False).with_(changed), engine(study=False)
+    found = changes(scene, other)
+    assert found == {"crank": ["length 40 mm → 50 mm"], "rod": ["mass 0.45 kg → 0.3 kg"]}
+    figure = Figure()
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    poses = [poses_at_start(one, DRAWN_AT) for one in (scene, other)]
+    draw(axes, scene, poses[0], found, (other, poses[1]))
+    words = {text.get_text(): text.get_color() for text in axes.texts}
+    assert words["rod\nmass 0.45 kg → 0.3 kg"] == CHANGED
+    assert words["slider"] != CHANGED
+    dashed = [
+        line for line in axes.lines if line.get_linestyle() == "--" and len(line.get_xdata()) == 2
+    ]
+    pin = 0.04 * np.array([np.cos(DRAWN_AT), np.sin(DRAWN_AT)])
+    assert any(np.allclose(np.column_stack(line.get_data())[1], pin) for line in dashed)
+
+
+def test_the_page_has_the_drawing_of_the_recommended_design_without_a_script(tmp_path):
+    scene = load_scene(GALLERY["linkages crank_rocker"], ["numerics.averaged_revolutions=1"])
+    response = simulate(scene.with_({"study": None}))
+    opened.write(response, tmp_path / "response.nc")
+    page = write_report(tmp_path).read_text()
+    assert 'alt="The mechanism to scale, with its dimensions." class="still"' in page
+    found = Results.of(response)
+    poses = moving.poses(scene, motion.latest(found, 1), 0)
+    placed = Placed(scene.linkage, poses)
+    for joint in scene.linkage.joints:  # as far apart as their clearance at most
+        apart = np.hypot(*(placed.at(joint.journal) - placed.at(joint.bearing)))
+        assert apart < 1.2 * (getattr(joint, "clearance", None) or 1e-9)

@@ -103,29 +103,50 @@ def _scene(shown: Results) -> "tuple[style.Figure, Any]":
 
 
 class _Mechanism:
-    """Bodies as lines and areas through their points."""
+    """Bodies as lines, sliders as squares, and clearances larger than they are: bearings about journals."""
 
     def __init__(self, axes: "style.Axes", shown: Results) -> None:
-        self._bodies, self._points, _ = moving.bodies(shown)
-        unit = labels.scale("m", self._points)
-        self._points = unit(self._points)
+        from matplotlib.patches import Circle
+
+        self._bodies, points, _ = moving.bodies(shown)
+        pins = shown.sel(joint=motion.pins(shown))
+        e = moving.eccentricities(pins)
+        self._pairs = moving.pairs(points, e)
+        unit, size = labels.scale("m", points), float(np.ptp(points, axis=(0, 1)).max())
+        known = motion.clearances(pins) if self._pairs and "penetration" in pins else np.zeros(0)
+        widest = float(np.nanmax(known, initial=0.0))
+        gain = max(1.0, float(f"{0.025 * size / widest:.0e}")) if widest else 1.0
+        for j, (journal, bearing) in enumerate(self._pairs):
+            points[:, bearing] = points[:, journal] - gain * e[:, j]
+        self._points = unit(points)
         low, high = self._points.min(axis=(0, 1)), self._points.max(axis=(0, 1))
         margin = 0.08 * float((high - low).max())
         (left, bottom), (right, top) = low - margin, high + margin
         axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
         axes.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
-        look: style.Look = {"lw": 2.0, "ms": 3.5, "animated": True}
+        axes.set_title(f"clearances enlarged {gain:g} times" if widest else "")
+        look: style.Look = {"lw": 3.0, "ms": 4.0, "solid_capstyle": "round", "animated": True}
         self._lines = [
             axes.plot([], [], "o-", color=style.colour(k), **look)[0]
             for k in range(len(self._bodies))
         ]
+        for line, places in zip(self._lines, self._bodies, strict=True):
+            if len(places) == 1:
+                line.set(marker="s", markersize=11.0, alpha=0.5)
+        radii = unit(np.nan_to_num(gain * known)) + 0.012 * size * unit.factor
+        edge: style.Look = {"fill": False, "lw": 1.2, "ec": style.colour("ink"), "animated": True}
+        self._rings = [Circle((0.0, 0.0), radius, **edge) for radius in radii]
+        for ring in self._rings:
+            axes.add_patch(ring)
 
     def at(self, k: int) -> list[Any]:
         """Artists at an instant; more than two points are a closed outline."""
         for line, places in zip(self._lines, self._bodies, strict=True):
             ends = [*places, places[0]] if len(places) > 2 else places
             line.set_data(*self._points[k, ends].T)
-        return self._lines
+        for ring, (_, bearing) in zip(self._rings, self._pairs, strict=False):
+            ring.set_center(self._points[k, bearing])
+        return [*self._lines, *self._rings]
 
 
 def _forces(axes: "style.Axes", shown: Results) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.written import reading
 from hpcclear.report.figures import curves, drawing, labels, motion, moving, style
 from hpcclear.report.figures.placed import Pose
@@ -36,7 +37,7 @@ def key(scene: Scene) -> list[str]:
 _WIDTH, _LINE = 170.0, 3.7  # mm of the figure, and of a line of the key
 _HEIGHTS = 55.0, 105.0  # mm, least and most of the drawing
 _BESIDE = 62.0  # mm of the column of curves
-_COLUMN = 60  # letters of a line
+_COLUMN = 57  # letters of a line
 
 
 @style.drawn
@@ -107,6 +108,17 @@ def _posed(response: Results) -> tuple[Scene, dict[str, Pose]]:
     at = 0.0 if scene.template is None else scene.template.DRAWN_AT / motion.TURN
     off = np.abs(np.mod(motion.turns(shown) - at + 0.5, 1.0) - 0.5)
     return scene, moving.poses(scene, shown, int(off.argmin()))
+
+
+def differences(response: Results, before: Results) -> dict[str, list[str]]:
+    """`changes` of the scenes of two responses; none where a file does not hold its scene whole."""
+    texts = [str(one.attrs.get("scene", "")) for one in (response, before)]
+    if texts[0] == texts[1]:
+        return {}
+    try:
+        return changes(*(scene_of_text(text, "scene") for text in texts))
+    except InputError:
+        return {}
 
 
 def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:

@@ -293,13 +293,13 @@
         if (still) add(`hub${k}`, "circle", { cx: motion.points[0][2 * k], cy: -motion.points[0][2 * k + 1], r: 0.12 * l, fill: "var(--soft)" });
       });
       motion.bodies.forEach((points, b) => {
-        if (points.length === 1) add(`body${b}`, "rect", { width: 0.7 * l, height: 0.5 * l, x: -0.35 * l, y: -0.25 * l, fill: "var(--line)", stroke: "var(--soft)", "stroke-width": thin });
-        else add(`body${b}`, "polygon", { fill: points.length > 2 ? "var(--line)" : "none", "fill-opacity": 0.5, stroke: `var(--c${2 * (b % 2)})`, "stroke-width": thick, "stroke-linejoin": "round", "stroke-opacity": 0.8 });
+        if (points.length === 1) add(`body${b}`, "rect", { width: 0.7 * l, height: 0.5 * l, x: -0.35 * l, y: -0.25 * l, fill: "var(--line)", stroke: motion.changed.includes(b) ? "var(--c1)" : "var(--soft)", "stroke-width": thin });
+        else add(`body${b}`, "polygon", { fill: points.length > 2 ? "var(--line)" : "none", "fill-opacity": 0.5, stroke: motion.changed.includes(b) ? "var(--c1)" : `var(--c${2 * (b % 2)})`, "stroke-width": thick, "stroke-linejoin": "round", "stroke-opacity": 0.8 });
       });
       motion.pairs.forEach((_, j) => {
         add(`ring${j}`, "circle", { fill: "none", stroke: "var(--c2)", "stroke-width": `${0.035 * l}` });
         add(`pin${j}`, "circle", { r: 0.05 * l, fill: "var(--ink)" });
-        add(`force${j}`, "line", { stroke: "var(--c1)", "stroke-width": `${0.05 * l}`, "stroke-linecap": "round" });
+        add(`force${j}`, "line", { stroke: "var(--c3)", "stroke-width": `${0.05 * l}`, "stroke-linecap": "round" });
       });
       const widest = Math.max(...motion.clearance, 1e-9);
       gain.max = Math.max(2, Math.round((0.6 * l) / widest));

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.report.figures import labels, motion, moving
+from hpcclear.report.figures import labels, motion, moving, sketch
 from hpcclear.report.figures.designs import searched
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
@@ -28,7 +28,10 @@ def picture(content: Content) -> dict[str, Any]:
     return {
         "front": front(content),
         "responses": {name: series(one) for name, one in content.responses.items()},
-        "motions": {name: frames(one) for name, one in content.responses.items()},
+        "motions": {
+            name: frames(one, content.responses.get("original", one))
+            for name, one in content.responses.items()
+        },
     }
 
 
@@ -231,8 +234,9 @@ def series(response: Results, most: int = 720) -> list[dict[str, Any]]:
     return found
 
 
-def frames(response: Results) -> dict[str, Any]:
-    """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs."""
+def frames(response: Results, before: Results) -> dict[str, Any]:
+    """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs; which bodies differ from
+    those of the response before."""
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))
@@ -240,8 +244,11 @@ def frames(response: Results) -> dict[str, Any]:
     e = moving.eccentricities(shown.sel(joint=motion.pins(shown)))
     bodies, points, angles = moving.bodies(shown)
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
+    names = ["crank", "rod", "slider"] if "rod_x" in shown else shown["body"].to_numpy().tolist()
+    different = sketch.differences(response, before)
     return {
         "bodies": bodies,
+        "changed": [k for k, name in enumerate(names) if name in different],
         "points": _digits(points.reshape(len(points), -1)),
         "angles": _digits(angles),
         "still": [bool(one) for one in still],
