@@ -32,7 +32,7 @@ from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.lanes import Lanes
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 
 WIDTHS = tuple(sorted({1, 16, 32, DEFAULT_LANES}))
 LONGEST = 600.0  # s, of one task or one compilation
@@ -238,7 +238,7 @@ def measure(samples: int, widths: Sequence[int], rounds: int) -> xr.Dataset:
         coords={"code": list(tasks), "width": list(widths)},
         attrs={
             "samples": samples,
-            **provenance("", ""),
+            **program(),
             "packed_kinds": str(dict(found[-1].packed)),
         },
     )

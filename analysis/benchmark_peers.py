@@ -38,7 +38,7 @@ from scenes import LAWS, ROOT, Setup, ensemble, scene, single
 
 from hpcclear.base import host
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 
 MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"
@@ -401,7 +401,7 @@ def main() -> None:
     faults += [f"ensemble, {law}: {fault}" for law, (_, why, _) in chosen.items() for fault in why]
     if faults:
         sys.exit("\n".join(["not timed, these codes solve other equations:", *faults]))
-    tree = xr.DataTree(xr.Dataset(attrs={**provenance("", ""), "missing": str(missing)}))
+    tree = xr.DataTree(xr.Dataset(attrs={**program(), "missing": str(missing)}))
     for name, found in runs.items():
         runs[name] = timed(found, solvers[found.attrs["law"]], rounds)
         tree[f"single/{name}"] = xr.DataTree(runs[name])

@@ -152,7 +152,7 @@ def measure(seconds: float, rounds: int) -> "xr.Dataset":
     """All rounds: start-up on 2 ranks, the design on 1, 2 and 4, statistics on 2."""
     import xarray as xr
 
-    from hpcclear.results.provenance import provenance
+    from hpcclear.results.provenance import program
 
     launch(2, "samples", 64)  # compiles
     count = int(seconds * 2 * SAMPLES_A_SECOND)
@@ -174,7 +174,7 @@ def measure(seconds: float, rounds: int) -> "xr.Dataset":
     return xr.Dataset(
         found,
         coords={"task": list(tasks)},
-        attrs={**provenance("", ""), "samples": count, "cores": os.cpu_count()},
+        attrs={**program(), "samples": count, "cores": os.cpu_count()},
     )
 
 

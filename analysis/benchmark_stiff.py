@@ -36,7 +36,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import Lanes
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import load_scene
 
 SCENES = {
@@ -280,7 +280,7 @@ def main() -> None:
     options = parser.parse_args()
     rounds = 1 if options.quick else 5
     rtols = 10.0 ** -np.arange(2.0, 11.01, 0.25)
-    tree = xr.DataTree(xr.Dataset(attrs=provenance("", "")))
+    tree = xr.DataTree(xr.Dataset(attrs=program()))
     all_runs = {}
     for name in options.scene or SCENES:
         all_runs[name] = measure(name, REVOLUTIONS, rtols, rounds)

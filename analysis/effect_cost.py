@@ -24,7 +24,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -209,7 +209,7 @@ def table(options: argparse.Namespace) -> xr.Dataset:
     for name in ("samples", "revolutions", "lanes", "pairs"):
         content.attrs[name] = getattr(options, name)
     text = JOB.read_text()
-    content.attrs |= provenance(text, load_scene(JOB).hash)
+    content.attrs |= load_scene(JOB).origin | {"scene": text} | program()
     return content
 
 

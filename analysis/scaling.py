@@ -26,7 +26,7 @@ from scaling_model import POLICIES, WORK, Costs, Outcome, simulate
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.schedule import HandOut, Need
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 
 LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
@@ -178,7 +178,7 @@ def model(costs: Costs, ranks: tuple[int, ...], seed: int = 1) -> xr.Dataset:
         coords={
             "samples": list(LONGER), "policy": names, "ranks": list(ranks), "quantile": [0, 0.5, 1],
         },
-        attrs={**provenance("", ""), "work_of_a_rank": f"{WORK:g} s"},
+        attrs={**program(), "work_of_a_rank": f"{WORK:g} s"},
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from hpcclear.base import width
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -63,7 +63,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.serve:
         return serve()
-    print(provenance("", "")["processor"])
+    print(program()["processor"])
     if width.features() is None:
         print("no vectors of 512 bits here: nothing to choose")
         return None

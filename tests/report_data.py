@@ -10,7 +10,7 @@ import xarray as xr
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
 from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 NAMES = ("m2", "m3", "u2", "I2", "C")
@@ -22,7 +22,7 @@ name = "</pre><b onclick=alert(1)>&amp;"
 "<u>contact" = "<img src=y onerror=alert(1)>"
 """
 CASES = ("deterministic", "robust")
-ATTRIBUTES = provenance(SCENE, "0" * 64)
+ATTRIBUTES = {"scene": SCENE, "scene_hash": "0" * 64, **program()}
 
 
 def objective(points: np.ndarray) -> np.ndarray:

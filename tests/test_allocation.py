@@ -16,6 +16,7 @@ from patience import crowded
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
+from hpcclear.report import scatter
 from hpcclear.report.answer import answer
 from hpcclear.report.constraints import worded
 from hpcclear.report.html.content import Content
@@ -100,8 +101,9 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert np.sqrt((slopes**2 * widths**2).sum() / 3) <= most
     parts = {"verification": found, "contributions": opened.read(tmp_path / "a/contributions.nc")}
-    lines = {line.label: line.text for line in answer(parts, "a")}
-    assert "most for its cost" in lines["tighten first"]
+    lines = {line.label: line.text for line in answer(parts)}
+    own = parts["contributions"].sel(design="a alpha")
+    assert "most for its cost" in "".join(scatter.tighten(own))
     assert "lightest" not in lines.get("near", "")  # widths of masses are no masses
     prices = parts["contributions"]["halving_cost"].sel(design="a alpha").to_numpy()
     assert prices == pytest.approx(costs / widths, rel=1e-9)
@@ -216,7 +218,7 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
             [clearance, 0.97 * float(one["m2"])], rel=1e-3
         )
     files = {"verification": found, "worst": worst}
-    text = next(line.text for line in answer(files, "x") if line.label == "worst case")
+    text = next(line.text for line in answer(files) if line.label == "worst case")
     assert text.startswith("f reaches at least")
     first = screen_of(Content(Path("x"), files, {}))
     (fit,) = [row.cells[-1] for row in first.rows if row.label.startswith("fit")]

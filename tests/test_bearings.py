@@ -79,7 +79,6 @@ def test_page_and_terminal_print_the_same_numbers_and_warnings(tmp_path, capsys,
         assert bearings.degrees(one) in cells
         assert bearings.degrees(one) in shown
         assert bearings.share(one.contact) in cells
-    assert bearings.validity(made) in cells
     (warning,) = bearings.flag_remarks(flag)
     assert any(warning in text for text in texts)
     assert warning in shown

@@ -87,14 +87,17 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
         {"design": ["case alpha"], "input": ["C", "m2", "m3", "u2", "other"]},
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
-    shares, tolerances, first = scatter.lines(Recommended({"contributions": content}, best, best))
-    assert first.label == "tighten first"
+    own = content.sel(design="case alpha")
+    names, shares, halves = zip(*scatter.shares(own), strict=True)
+    assert names == ("C", "m2+m3 (correlated)", "u2")
+    assert shares == (0.55, 0.3, 0.001)
+    assert halves == pytest.approx([1.96 * error for error in (0.01, 0.02, 0.004)])
+    (tolerances,) = scatter.lines(Recommended({"contributions": content}, best, best))
     listed = (
-        "C 55% ± 2%, m2+m3 (correlated) 30% ± 4%, u2 below 0.8%. The cubic fit does not explain 15%"
+        "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%. The cubic fit does not explain 15%"
     )
-    assert listed in shares.text
-    assert "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%" in tolerances.text
-    assert "other" not in shares.text + tolerances.text
+    assert listed in tolerances.text
+    assert "other" not in tolerances.text
     assert list(scatter.lines(Recommended({}, best, best))) == []
 
 
@@ -165,7 +168,8 @@ def test_two_blocks_are_listed_as_two():
         },
         {"design": ["case alpha"], "input": list("abcde")},
     )  # fmt: skip
-    best = xr.Dataset(coords={"design": "case alpha"})
-    shares, _, first = scatter.lines(Recommended({"contributions": content}, best, best))
-    assert "a+b (correlated) 30% ± 2%, c+d (correlated) 20% ± 2%, e 10% ± 2%" in shares.text
-    assert "them together lowers the standard deviation of f by 43% ± 1%" in first.text
+    own = content.sel(design="case alpha")
+    assert [one[0] for one in scatter.shares(own)] == ["a+b (correlated)", "c+d (correlated)", "e"]
+    assert "them together lowers the standard deviation of f by 43% ± 1%" in "".join(
+        scatter.tighten(own)
+    )

@@ -24,7 +24,7 @@ from hpcclear.base.outcome import FIELDS, JOINTS, Status, failed, record_type
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, designs_in
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 
 SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
 HASH = "c0ffee" * 10 + "beef"
@@ -50,7 +50,7 @@ def outcomes(n: int) -> np.ndarray:
 def samples(n: int = 9) -> xr.Dataset:
     values = np.random.default_rng(1).random((n, 3))
     names, units = ["m2", "C", "mechanism.rod.length"], {"mechanism.rod.length": "m"}
-    made_by = provenance(SCENE, HASH)
+    made_by = {"scene": SCENE, "scene_hash": HASH, **program()}
     return dataset.samples_dataset(names, values, units, outcomes(n), made_by).to_xarray()
 
 
@@ -79,7 +79,9 @@ def example(kind: str) -> xr.Dataset:
         data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
     if table.limit_dims is not None:
         data["m2_lower"] = np.zeros(tuple(sizes[dim] for dim in table.limit_dims))
-    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH)).to_xarray()
+    return dataset.dataset(
+        kind, coords, data, {"scene": SCENE, "scene_hash": HASH, **program()}
+    ).to_xarray()
 
 
 # -- table and builders -------------------------------------------------------------------------

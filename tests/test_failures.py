@@ -85,10 +85,10 @@ def test_samples_say_by_which_status_where_and_what_to_do():
 
 def test_the_answer_explains_failures_in_lines_of_their_own():
     samples, count = failing_samples()
-    told = answer({"verification": data.verification(), "samples": samples}, "")
+    told = answer({"verification": data.verification(), "samples": samples})
     (text,) = [line.text for line in told if line.label == "failed"]
     assert text.startswith(f"{count} of 60 samples step_cap")
-    plain = answer({"verification": data.verification(), "samples": data.samples(failed=0 + 1)}, "")
+    plain = answer({"verification": data.verification(), "samples": data.samples(failed=0 + 1)})
     assert len([line for line in plain if line.label == "failed"]) == 1
 
 

@@ -252,7 +252,7 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
     folder, output = study
     found = verified(folder)
     (criterion,) = (
-        line.text for line in answer({"verification": found}, "out") if line.label == "criterion"
+        line.text for line in answer({"verification": found}) if line.label == "criterion"
     )
     assert (
         "lowest probability of f above 0.0003 m of" in criterion

@@ -37,7 +37,7 @@ def commands() -> Iterator[str]:
 
 
 SCENE_PAGES = {
-    "scene": ("The file", "[output", "[plugins"),
+    "scene": ("The file", "[about", "[output", "[plugins"),
     "scene-slider-crank": ("[mechanism] of kind slider-crank", "[mechanism.crank", "[mechanism.slider", "[drive", "[joints"),
     "scene-linkage": ("[mechanism] of kind planar", "[mechanism.bodies", "[mechanism.ground", "[mechanism.joints"),
     "scene-loads": ("[mechanism.drives", "[mechanism.loads"),

@@ -19,7 +19,7 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.surrogate.piecewise import Leaf
@@ -56,7 +56,8 @@ class Panels:
         self._listener = notify
         self.values: Variables = {}
         self.attributes: dict[str, object] = {
-            **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
+            **scene.origin,
+            **program(),
             "profile": profile.name,
             "command": command_line(),
             "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",

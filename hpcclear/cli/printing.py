@@ -3,6 +3,7 @@
 import contextlib
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,6 +88,7 @@ def describe_response(response: Results, output: Path, details: bool | None = No
 
 def fitted(first: Screen, most: int) -> list[Text]:
     """Return a first screen in at most so many lines: rows of the table go first, then green lines, then advice."""
+    first = first.shown()
     rows, trust, steps = len(first.rows), len(first.trust), min(len(first.steps), 2)
     while True:
         lines = list(_lines(first, rows, trust, steps))
@@ -106,27 +108,14 @@ def fitted(first: Screen, most: int) -> list[Text]:
 
 def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
     """The lines of a first screen with so many rows, lines on trust and steps."""
-    for line in _wrapped(first.headline):
+    for line in _wrapped(f"{first.title}: {first.headline}" if first.title else first.headline):
         yield Text(line, "bold")
     if first.doubt:
         yield from (Text(line, "bold red") for line in _wrapped(f"Indicative only: {first.doubt}"))
     yield from map(Text, _wrapped("; ".join(filter(None, first.about))))
     yield Text("")
-    numbers = [[one.label, one.before, one.value, one.change, one.within] for one in first.tiles]
-    table = [
-        [
-            row.label,
-            *row.cells,
-            "",
-            f"{row.span.bound} bound" if row.span and row.span.bound else "",
-        ]
-        for row in first.rows[:rows]
-    ]
-    if first.header[1:2] == ("today",):
-        yield from _columns([["", *first.header[1:], "change", "95 %"], *numbers, *table])
-    else:
-        yield from _columns([[row[0], *row[2:]] for row in numbers])
-        yield from _columns([first.header, *table] if table else [])
+    for table in replace(first, rows=first.rows[:rows]).tables():
+        yield from _columns(table)
     if rows < len(first.rows):
         yield Text(f"and {len(first.rows) - rows} more")
     yield Text("")

@@ -45,7 +45,7 @@ from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.scene import record_of
@@ -187,7 +187,8 @@ def _response(
         "response",
         {"time": times, "joint": labels, **_dimensions(scene), **counted},
         {**data, **reported},
-        provenance(named.text or named.to_toml(), named.hash, named.references)
+        named.origin
+        | program()
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
         | _kept(scene)

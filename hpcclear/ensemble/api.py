@@ -13,7 +13,7 @@ from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.samples import samples_of
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.points import Points, check_points
@@ -85,6 +85,6 @@ def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Datas
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)
-    made = provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
+    made = scene.origin | program()
     attributes = made | recorded(scene, records)
     return samples_of(designs, records, attributes, scene.objective, scene.joint_labels).to_xarray()

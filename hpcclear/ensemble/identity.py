@@ -4,8 +4,9 @@ import hashlib
 import json
 
 from hpcclear.plugins.sources import digest
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
+from hpcclear.scene.about import inputs_of
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.points import Points
 from hpcclear.statistics.streams import BINS, BLOCK
@@ -17,8 +18,8 @@ def run_key(scene: Scene, command: str) -> dict[str, str]:
     The scene entry by entry, so that a message can name those that changed; besides, all that
     shapes the last bits of a result. The numbers of ranks and of lanes are not among it.
     """
-    origin = provenance(scene.text, scene.hash)
-    entries = {path: json.dumps(value) for path, value in flatten(scene.resolved())}
+    origin = program()
+    entries = {path: json.dumps(value) for path, value in flatten(inputs_of(scene.resolved()))}
     for module, text in scene.plugin_texts.items():
         entries[f"plugins.files.{module}.source"] = f"SHA-256 {digest(text)}"
     made_by = {name: origin[name] for name in ("hpcclear_version", "versions", "processor")}

@@ -12,7 +12,7 @@ from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -135,7 +135,7 @@ def _differing(ours: Results, theirs: Results) -> Iterator[str]:
 
 def _changed(content: Results, scene: Scene) -> Iterator[str]:
     """What the file says of programs and processor, where that is not what is here."""
-    now = provenance("", scene.hash)
+    now = program()
     for name in ("hpcclear_version", "processor"):
         if content.attrs.get(name) != now[name]:
             yield f"{name}: {content.attrs.get(name)}, here {now[name]}"

@@ -36,7 +36,7 @@ from hpcclear.results.checkpoint import (
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key, key_attribute, key_of
 from hpcclear.results.places import fresh_sibling, parts_of
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.scene import record_of
 
@@ -274,7 +274,8 @@ class Session:
         (arguments as of `record_of`)."""
         self.joints, self.record = scene.joint_labels, record_of(scene, mapped)
         self.attributes = {
-            **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
+            **scene.origin,
+            **program(),
             **key_attribute(self.key),
         }
 

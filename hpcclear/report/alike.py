@@ -21,7 +21,7 @@ FLAT = 0.01
 
 
 def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
-    """Return the designs whose merit (n,) is within `FLAT` of the best, what they share, and the lightest; "" if none."""
+    """Return the designs whose merit (n,) is within `FLAT` of the best, in what they differ, and the lightest; "" if none."""
     if not satisfies(best):
         return ""  # there is no recommended design
     least = float(merit.min())
@@ -34,12 +34,6 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
     text = f"{_listed(names)}: criterion within {FLAT:.0%} of the recommended design"
     if found := spans(ours, best, names):
         text += f"; they differ in {found}"
-    same = [
-        f"{labels.words(one)} = {labels.value(one.isel(design=0))}"
-        for one in labels.design_variables(together)
-        if np.ptp(one.to_numpy()) <= SAME * abs(one.to_numpy().max())
-    ]
-    text += f"; in common: {', '.join(same)}" if same else ""
     return text + _lightest(together, best)
 
 

@@ -1,7 +1,4 @@
-"""The result of a study in a dozen lines, from its files alone: recommended design, its confidence, next steps.
-
-The command prints them at its end, and they head the page.
-"""
+"""What the page says of a recommended design besides the first screen, in lines from the files alone; and next steps."""
 
 from collections.abc import Iterator, Mapping
 
@@ -9,7 +6,6 @@ import numpy as np
 
 from hpcclear.report import alike
 from hpcclear.report.constraints import prices_of, worded
-from hpcclear.report.figures import labels
 from hpcclear.report.merit import best_of, judged, merit, ours_of
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
@@ -22,24 +18,14 @@ FAR = 0.2
 """Relative error of the surrogate above which more samples are advised."""
 
 
-def answer(files: Mapping[str, Results], place: str) -> list[Line]:
-    """Return the lines, the most important first; none if no design was verified.
-
-    Parameters
-    ----------
-    files : mapping of str to xarray.Dataset
-        Result files by their kind.
-    place : str
-        Directory they are in, as the reader knows it; "" on the page itself.
-    """
+def answer(files: Mapping[str, Results]) -> list[Line]:
+    """Return the lines of result files by their kind, the most important first; none if no design was verified."""
     verified = files.get("verification")
     if verified is None or not np.isfinite(verified["mean_true"]).any():
         return []
     ours = ours_of(verified)
     of = Recommended(files, ours, best_of(ours))
-    advised = [*steps(of), *([f"hpcclear report {place}"] if place else [])]
-    lines = [line for part in declared(LinesOf) for line in part.lines(of)]
-    return [*lines, *([Line("next steps", "; ".join(advised))] if advised else [])]
+    return [line for part in declared(LinesOf) for line in part.lines(of)]
 
 
 def steps(of: Recommended) -> list[str]:
@@ -56,8 +42,8 @@ def _head(of: Recommended) -> Iterator[Line]:
     """Why the design is recommended, the verdicts on its constraints, and designs that are nearly as good."""
     ours, best = of.ours, of.best
     case = str(best["case"].item()) if "case" in best else "of the study"
-    criterion = f"{merit(ours, best)} of {ours.sizes['design']} simulated designs, case {case}"
-    yield Line("criterion", f"{criterion}; f: {labels.objective(ours)}")
+    count = ours.sizes["design"]
+    yield Line("criterion", f"{merit(ours, best)} of {count} simulated designs, case {case}")
     yield from (Line("constraint", text) for text in worded(best))
     if near := alike.flat(ours, best, judged(ours)):
         yield Line("near", near)
@@ -70,8 +56,13 @@ def unit_of(one: Results, name: str) -> str:
 
 
 def _sure(of: Recommended) -> Iterator[Line]:
-    """How well the numbers of the recommended design are known."""
-    best = of.best
+    missed = str(of.best["accuracy_missed"].item()) if "accuracy_missed" in of.best else ""
+    more = f". Requested accuracy not reached: {missed}" if missed else ""
+    yield Line("confidence", f"{confidence(of.best)}{more}")
+
+
+def confidence(best: Results) -> str:
+    """Return how well the numbers of a design are known, and what their intervals cover."""
     count = int(best["samples"]) if "samples" in best else 0
     level = float(best.attrs.get("confidence", np.nan))
     text = f"{count} simulations of the recommended design"
@@ -88,12 +79,7 @@ def _sure(of: Recommended) -> Iterator[Line]:
             else "sampling error only"
         )
         text += f"; {level:.0%} confidence intervals, which cover {covered}"
-    if missed := str(best["accuracy_missed"].item()) if "accuracy_missed" in best else "":
-        text += f". Requested accuracy not reached: {missed}"
-    errors = surrogate_errors(best)
-    if len(errors) == 2:
-        text += f". Surrogate error: mean {errors[0]:+.1%}, standard deviation {errors[1]:+.1%}"
-    yield Line("confidence", text)
+    return text
 
 
 def surrogate_errors(best: Results) -> list[float]:

@@ -1,20 +1,17 @@
 """Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.outcome import Flag
 from hpcclear.report.figures import labels, motion
+from hpcclear.report.html.content import scene_in
 from hpcclear.results.content import Results
-from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
-from hpcclear.scene.loading import scene_of_text
 
 ROUNDING = 1e-12
 """Of the largest torque: a smaller mean is zero but for rounding."""
@@ -130,17 +127,8 @@ def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
 
 def _one_drive(response: Results) -> bool:
     """Whether all work is that of a single drive; a slider-crank has no other."""
-    scene = _scene_in(str(response.attrs.get("scene"))) if "drive_phase" in response else None
+    scene = scene_in(str(response.attrs.get("scene"))) if "drive_phase" in response else None
     return "drive_phase" not in response or (scene is not None and len(scene.linkage.drives) == 1)
-
-
-@lru_cache(maxsize=4)
-def _scene_in(text: str) -> Scene | None:
-    """The scene of a file, which each table requests of a page; None without it, or of another version."""
-    try:
-        return scene_of_text(text, "scene")
-    except InputError:
-        return None
 
 
 def remarks(response: Results) -> list[tuple[str, str]]:
@@ -167,20 +155,6 @@ def _gaining(response: Results) -> list[str]:
         for k, joint in enumerate(map(str, response["joint"].to_numpy()))
         if lost[k] + reach[k] < 0.0
     ]
-
-
-def validity(response: Results) -> str:
-    """Return in plain words whether the model is valid for a response."""
-    status, flags = Status(int(response["status"])), int(response["flags"])
-    if not status.valid:
-        return "the simulation failed: no number of it is a result"
-    if flags & Flag.BEYOND_HERTZ:
-        return "outside the range of the contact law: forces are indicative only"
-    if flags & Flag.LATCHED:
-        return (
-            "within the range of the contact law; results may depend on the integration tolerance"
-        )
-    return "within the range of the contact law"
 
 
 def share(contact: float) -> str:
@@ -257,7 +231,7 @@ def _weights(time: Array) -> Array:
 
 def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
-    if (scene := _scene_in(str(response.attrs.get("scene")))) is None:
+    if (scene := scene_in(str(response.attrs.get("scene")))) is None:
         return {}
     pins = {joint: scene.pin(joint) for joint in scene.pins()}
     lengths = {joint: path for joint, one in pins.items() if (path := length_path(one)) is not None}

@@ -27,30 +27,18 @@ SMALL = 0.005
 
 
 def lines(of: Recommended) -> Iterator[Line]:
-    """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
-    they are not known."""
+    """Yield what halving each tolerance brings, the largest first, and what the fit lacks; none where they are not known."""
     own = of.of_best("contributions")
-    if own is None:
+    if own is None or not shares(own):
         return
-    parts = shares(own)
-    if not parts:
-        return
-    text = (
-        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}"
-    )
-    if (rest := float(own["unexplained"])) >= 0.005:
-        text += (
-            f". The cubic fit does not explain {rest:.0%}: finer structure of f, interactions of three inputs, chaotic "
-            "motion"
-        )
-    yield Line("contributions", text)
     names, falls, errors, _ = _inputs(own, "halved")
     each = [(*one[:2], HALF_WIDTH * one[2]) for one in zip(names, falls, errors, strict=True)]
-    yield Line(
-        "tolerances",
-        f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
+    text = (
+        f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}"
     )
-    yield from (Line("tighten first", text) for text in tighten(own))
+    if (rest := float(own["unexplained"])) >= 0.005:
+        text += f". The cubic fit does not explain {rest:.0%} of the variance"
+    yield Line("tolerances", text)
 
 
 def _inputs(own: Results, kind: str) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
@@ -157,50 +145,28 @@ def _upwards(half_width: float, step: float) -> float:
 
 
 LITTLE = 0.01
-"""Share of the variance of f, with its half-width, below which a variable is called negligible."""
+"""Share of the variance of f below which chaotic scatter is not named."""
 
 UNSURE = 0.1
 """Half-width of a Sobol index above which more samples are advised."""
 
 
 def _indices(of: Recommended) -> Iterator[Line]:
-    """First-order and total Sobol indices with their errors, the largest total first; none where they are not known."""
+    """Total Sobol indices with their errors, the largest first; none where they are not known."""
     found = of.files.get("sensitivity")
     if found is None or "sobol_total" not in found:
         return
-    indices = {
-        kind: [found[f"sobol_{kind}{end}"].to_numpy() for end in ("", "_error")]
-        for kind in ("first", "total")
-        if f"sobol_{kind}" in found
-    }
-    total, error = indices["total"]
+    total, error = (found[f"sobol_total{end}"].to_numpy() for end in ("", "_error"))
     if not total.size or not np.isfinite([total, error]).all():
         return
     names = [str(name) for name in found["parameter"].to_numpy()]
-    order = np.argsort(-total, kind="stable")
-    little = total + HALF_WIDTH * error < LITTLE
-    texts = {
-        kind: ", ".join(
-            share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
-        )
-        for kind, (value, error) in indices.items()
-    }
-    own = "first-order Sobol indices, the share of the variance of f that a variable explains alone (± 95 % half-width)"
-    if texts["total"] and "first" in texts:
-        yield Line("sensitivity", f"{own}: {texts['first']}")
-    if texts["total"]:
-        words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
-        yield Line("interactions", f"{words}: {texts['total']}")
+    parts = [(name, v, HALF_WIDTH * e) for name, v, e in zip(names, total, error, strict=True)]
+    words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
+    yield Line("interactions", f"{words}: {_listed(parts)}")
     noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
     if noise > HALF_WIDTH * doubt and noise > LITTLE:
         text = f"{share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
         yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
-    if little.any():
-        hardly = ", ".join(names[k] for k in order if little[k])
-        yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
-    if half_width(found) > UNSURE:
-        text = f"Sobol indices are known to ± {UNSURE:.0%} or worse: raise study.sensitivity.sobol_samples"
-        yield Line("warning", text)
 
 
 def half_width(found: Results | None) -> float:

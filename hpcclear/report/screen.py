@@ -4,7 +4,7 @@ Each kind of result makes its own (`ScreenOf` in `PARTS` of a module of `hpcclea
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from hpcclear.report.figures import labels
 
-WORRIES = 6
-"""Lines on what to trust."""
+WORRIES, TILES = 6, 4
+"""Lines on what to trust, and figures, of a first screen; a sheet has all."""
 
 
 class Level(IntEnum):
@@ -84,13 +84,14 @@ class Screen:
     doubt: str = ""
     """Why the headline is not to be relied on; "" where nothing is known against it."""
     tiles: tuple[Tile, ...] = ()
-    """At most four."""
+    """The most important first."""
     header: tuple[str, ...] = ()
     rows: tuple[ScreenRow, ...] = ()
     """header and rows: the table beside, and its heads; the rows' label is the first."""
     remark: str = ""
     """Below the table."""
     trust: tuple[Trust, ...] = ()
+    """Red first."""
     bars: tuple[ShareBar, ...] = ()
     """What the scatter comes from."""
     causes: str = ""
@@ -99,11 +100,38 @@ class Screen:
     """What to do next, the most useful first."""
     figures: tuple[str, ...] = ()
     """Names of the figures that stand beside, as `hpcclear plot` calls them."""
+    limits: tuple[str, ...] = ()
+    """What the intervals cover."""
+    title: str = ""
+    """What the scene says that it is about."""
+
+    def shown(self) -> "Screen":
+        """Return what a first screen has room for."""
+        return replace(self, tiles=self.tiles[:TILES], trust=self.trust[:WORRIES])
+
+    def tables(self) -> "list[list[Sequence[str]]]":
+        """Return figures and design in rows, heads first: one table where both stand beside today's, else one each."""
+        if self.header[1:2] == ("today",):
+            tiles = ((t.label, t.before, t.value, t.change, t.within) for t in self.tiles)
+            ends = (
+                f"{row.span.bound} bound" if row.span and row.span.bound else ""
+                for row in self.rows
+            )
+            design = zip(self.rows, ends, strict=True)
+            rows = [(row.label, *row.cells, "", end) for row, end in design]
+            return [[("", *self.header[1:], "change", "95 %, note"), *tiles, *rows]]
+        numbers = [(one.label, one.value, one.change, one.within) for one in self.tiles]
+        rows = [(row.label, *row.cells) for row in self.rows]
+        own: list[list[Sequence[str]]] = [
+            [("quantity", "value", "", "95 %, note"), *numbers],
+            [self.header, *rows],
+        ]
+        return [table for table in own if len(table) > 1]
 
 
 def trusted(lines: Iterable[Trust]) -> tuple[Trust, ...]:
-    """Return the lines on what to trust, red first, at most `WORRIES`."""
-    return tuple(sorted(lines, key=lambda one: one.level)[:WORRIES])
+    """Return the lines on what to trust, red first."""
+    return tuple(sorted(lines, key=lambda one: one.level))
 
 
 def percent(share: float) -> str:

@@ -93,7 +93,7 @@ class Checkpoint:
     units : mapping of str to str, optional
         Units of those that are not the paper's.
     attributes : mapping, optional
-        Global attributes of the part files (`hpcclear.results.dataset.provenance`).
+        Global attributes of the part files (`Scene.origin` and `hpcclear.results.provenance.program`).
     joints : sequence of str
         Labels of the joints of the records.
     record : dtype

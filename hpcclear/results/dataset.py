@@ -71,7 +71,7 @@ def dataset(
         Variables of the kind, and design variables under their names or scene paths; for Kriging
         models also their bounds, NAME_lower and NAME_upper. Shapes as in the table.
     attributes : mapping, optional
-        Further global attributes, text or numbers; see `provenance`.
+        Further global attributes, text or numbers; see `hpcclear.results.provenance.program` and `Scene.origin`.
     units : mapping of str to str, optional
         Units of design variables; those of the paper's (`DESIGN_VARIABLES`) are known.
     objective : Objective

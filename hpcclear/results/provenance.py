@@ -10,25 +10,9 @@ from hpcclear.base import host
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
 
 
-def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, str]:
-    """Global attributes that say what made a file; no time in them: equal runs, equal bytes.
-
-    Parameters
-    ----------
-    scene, scene_hash : str
-        Its text and the hash of its content.
-    references : str
-        Published work that its numbers are taken from; "" leaves the attribute out.
-    """
-    return {
-        **({"references": references} if references else {}),
-        "scene": scene, "scene_hash": scene_hash, **program(),
-    }  # fmt: skip
-
-
 @functools.cache
 def program() -> dict[str, str]:
-    """Return what is said of the program, the packages that it uses and the processor."""
+    """Return what is said of the program, the packages that it uses and the processor; no time: equal runs, equal bytes."""
     version, python = _version_of("hpcclear"), f"python {platform.python_version()}"
     return {
         "source": f"hpcclear {version}", "history": f"written by hpcclear {version}", "hpcclear_version": version,

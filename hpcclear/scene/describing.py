@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from hpcclear.plugins.sources import digest
+from hpcclear.scene.about import inputs_of
 from hpcclear.scene.driving import CrankTorque, speed_entry
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar, slender_inertia
@@ -303,7 +304,7 @@ def differences(first: SceneTables, second: SceneTables) -> list[str]:
     equal."""
     ours, theirs = (
         {k: f"SHA-256 {digest(v)}" if k.startswith("plugins.files.") else v for k, v in entries}
-        for entries in (flatten(first.resolved()), flatten(second.resolved()))
+        for entries in (flatten(inputs_of(one.resolved())) for one in (first, second))
     )
     lines = [
         f"{key}: {_entry(first, key, ours)} -> {_entry(second, key, theirs)}"

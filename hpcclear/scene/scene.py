@@ -21,7 +21,7 @@ from hpcclear.scene.validation import check_path, scene_of
 
 
 class Scene(ConsistentTables):
-    """A validated scene file with SI numbers. It is immutable; scenes with equal content are equal. `load_scene` reads
+    """A validated scene file with SI numbers. It is immutable; scenes with equal inputs are equal. `load_scene` reads
     one, and `with_` returns a changed copy, validated again.
     """
 
@@ -45,6 +45,14 @@ class Scene(ConsistentTables):
     def references(self) -> str:
         """Title of the published work the mechanism is taken from, "" for one of its user's own."""
         return describing.cited_by(self)
+
+    @property
+    def origin(self) -> dict[str, str]:
+        """What files say of it in their attributes: its text and hash, what it was taken from, and what it is about."""
+        words = {} if self.about is None else self.about.model_dump(exclude_none=True)
+        about = {f"about_{name}": str(text) for name, text in words.items()}
+        cited = {"references": self.references} if self.references else {}
+        return {**cited, "scene": self.text or self.to_toml(), "scene_hash": self.hash, **about}
 
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""

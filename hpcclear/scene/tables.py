@@ -14,6 +14,7 @@ from hpcclear.base.units import is_written_in
 from hpcclear.base.written import Texts, reading, shown, text_of
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
+from hpcclear.scene.about import About, inputs_of
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Table, nearest
@@ -36,6 +37,7 @@ class SceneTables(Table):
 
     format_version: Literal[1, 2] = 1
     """Version of the format; 2 is read as 1."""
+    about: About | None = None
     mechanism: Annotated[SliderCrank | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
@@ -274,12 +276,11 @@ class SceneTables(Table):
 
     @property
     def hash(self) -> str:
-        """SHA-256 of the resolved content: spelling, comments and units of the file do not
-        matter."""
+        """SHA-256 of the inputs: spelling, comments and units of the file do not matter, nor does [about]."""
         if self._known_hash is None:  # a scene never changes, and every cache asks
             # The order of keys stays as it is: tables have the model's order, and the order of
             # study variables is the order of the columns of their design, so it has to count.
-            content = json.dumps(self.resolved(), ensure_ascii=True, allow_nan=False)
+            content = json.dumps(inputs_of(self.resolved()), ensure_ascii=True, allow_nan=False)
             self._known_hash = hashlib.sha256(content.encode()).hexdigest()
         return self._known_hash
 

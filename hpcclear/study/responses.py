@@ -12,7 +12,7 @@ from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.report.figures.motion import phase
 from hpcclear.results.content import Results
 from hpcclear.results.dataset import variable_name
-from hpcclear.results.provenance import provenance
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
@@ -104,7 +104,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             )
             continue
         content = _steady(scene, response)
-        made_by = provenance(scene.to_toml(), scene.hash, scene.references)
+        made_by = {**scene.origin, "scene": scene.to_toml(), **program()}
         file = f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc"
         run.write(content, file, {**made_by, "design": name})
 

@@ -13,15 +13,21 @@ from hpcclear.ranks.stopping import Exit
 @click.option(
     "-o", "--output", type=cli.PATH, help="Page to write. Default: report.html beside the results."
 )
+@click.option(
+    "--sheet", is_flag=True, help="Write one sheet of A4 to sign (sheet.pdf) instead of the page."
+)
 @cli.TRUST
-def run(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
+def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool) -> int:
     """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
-    Example: hpcclear report results/quickstart
+    Examples: hpcclear report results/quickstart, hpcclear report results/quickstart --sheet
     """
     from hpcclear.plugins import trusting
     from hpcclear.report.html.page import write_report
+    from hpcclear.report.sheet import write_sheet
 
+    write = write_sheet if sheet else write_report
     with trusting(trust):
-        cli.show(f"report  {write_report(*places, output=output and cli.place_of(output))}")
+        place = write(*places, output=output and cli.place_of(output))
+    cli.show(f"{'sheet' if sheet else 'report'}  {place}")
     return Exit.DONE

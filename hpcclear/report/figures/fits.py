@@ -1,12 +1,10 @@
 """How well surrogates fit: R2 on test points, and words for those that do not."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from hpcclear.report.figures import style
-from hpcclear.report.parts import LinesOf, Recommended
-from hpcclear.report.spread import Line
 from hpcclear.results.content import Results
 
 LOW = 0.9
@@ -57,20 +55,6 @@ def captioned(kind: str, caption: str) -> Callable[[Results], str]:
         return f"{caption} Warning: {'; '.join(found)}." if found else caption
 
     return of
-
-
-def _poor(of: Recommended) -> Iterator[Line]:
-    """Surrogates that do not fit, a sentence for each kind of them."""
-    for kind, what in (
-        ("sensitivity", "sensitivities by slopes"),
-        ("kriging", "the search began there"),
-    ):
-        if found := warnings(kind, of.files.get(kind)):
-            text = f"{'; '.join(found)} ({what}); simulated values do not depend on surrogates"
-            yield Line("warning", text)
-
-
-PARTS = (LinesOf(50, _poor),)
 
 
 def mark(axes: "style.Axes", r2: float, height: float = 0.5) -> None:

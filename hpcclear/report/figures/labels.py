@@ -27,10 +27,9 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 FLAGS = {
-    Flag.LATCHED: "a joint stayed in contact for at least one averaged revolution. Its damping still uses the last impact "
-    "velocity, so results may depend on the integration tolerance; the law hunt-crossley has no such memory",
-    Flag.BEYOND_HERTZ: "indentation is beyond the range of the contact law (Hertz contact: 25 % of the clearance): forces are "
-    "indicative",
+    Flag.LATCHED: "a joint stayed in contact for a whole revolution, and its damping still uses the last impact velocity: "
+    "results may depend on the integration tolerance; the law hunt-crossley avoids it",
+    Flag.BEYOND_HERTZ: "indentation beyond the range of the contact law (Hertz: 25 % of the clearance): forces are indicative",
     Flag.STIFF: "the implicit method was used for part of the run",
 }
 """What flags of a sample say."""

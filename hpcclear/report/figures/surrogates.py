@@ -262,11 +262,8 @@ def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
 PARTS = (
     FigureOf(
         "sensitivity", "sensitivities", sensitivity_figure,
-        fits.captioned(
-            "sensitivity",
-            "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
-            "from the ranges at which they converged.",
-        ),
+        "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: from the "
+        "ranges at which they converged.",
     ),
     FigureOf(
         "sensitivity", "sobol", sobol_figure,

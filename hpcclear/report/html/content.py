@@ -2,12 +2,17 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
+
+import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE
+from hpcclear.scene import Scene
+from hpcclear.scene.loading import scene_of_text
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class Content:
     """Whether this is all of a directory, not files that were chosen."""
     samples: dict[str, dict[str, Results]] = field(default_factory=dict)
     """Where several samples are all that there is, each with its run times, by the name of its file; `files` has the first."""
+    dated: float = np.nan
+    """Time at which the newest of these files was written, s since 1970."""
 
     def get(self, kind: str) -> Results | None:
         """The dataset of a kind, or None."""
@@ -71,10 +78,12 @@ def read(*places: str | Path) -> Content:
     troubles: list[str] = []
     others: list[str] = []
     found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
+    dated = np.nan
     for path, one in found:
         if isinstance(one, InputError):
             troubles.append(f"{path.relative_to(place)} was left out: {one.reason}.")
             continue
+        dated = np.fmax(dated, path.stat().st_mtime)
         kind = "map" if SHAPE in one.attrs else str(one.attrs["hpcclear_kind"])
         if kind in ("samples", "timing"):
             own = several.setdefault(str(path.with_suffix("")).removesuffix(".timing"), {})
@@ -101,7 +110,20 @@ def read(*places: str | Path) -> Content:
         reason = "there is no result file in it"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
     every = (*troubles, *_strangers(files))
-    return Content(place, files, names, responses, every, whole, samples)
+    return Content(place, files, names, responses, every, whole, samples, float(dated))
+
+
+def scene_in(text: str) -> Scene | None:
+    """Return the scene of a file; None without it, or of another version."""
+    try:
+        return _scene(text)
+    except InputError:
+        return None
+
+
+@lru_cache(maxsize=4)
+def _scene(text: str) -> Scene:
+    return scene_of_text(text, "scene")
 
 
 def _strangers(files: dict[str, Results]) -> list[str]:

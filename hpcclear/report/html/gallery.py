@@ -2,7 +2,7 @@
 
 import base64
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,10 +45,17 @@ MOST_DRAWN = 4
 """Files of samples whose own figures stand on a page: each takes a second and up to 1 MB."""
 
 
-def figures(content: Content, troubles: list[str]) -> list[dict[str, str]]:
-    """All figures: name, subject, picture (PNG, base64) and caption; in `troubles`, why one was left out."""
-    made = []
-    for name, kind, caption, draw in _drawings(content):
+def figures(
+    content: Content, troubles: list[str], first: Sequence[str] = (), most: int | None = None
+) -> list[dict[str, str]]:
+    """Figures, those named `first` before the others, at most so many: name, subject, picture (PNG, base64) and caption; in
+    `troubles`, why one was left out."""
+    made: list[dict[str, str]] = []
+    for name, kind, caption, draw in sorted(
+        _drawings(content), key=lambda one: one[0] not in first
+    ):
+        if len(made) == most:
+            break
         drawn = attempt(f"The figure “{caption}”", functools.partial(_png, draw), troubles)
         if drawn:
             subject = SUBJECTS.get(kind, "sensitivities")

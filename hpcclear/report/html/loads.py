@@ -16,7 +16,7 @@ from hpcclear.results.content import Results
 
 
 def loads(content: Content) -> list[object] | None:
-    """Return tables of the bearings of every stored response, torque and validity, impacts, then remarks; None without any."""
+    """Return tables of the bearings of every stored response, torque, impacts, then remarks; None without any."""
     every = content.responses
     verified = content.get("verification")
     chosen = ("original", recommended(verified)) if verified is not None else ()
@@ -27,9 +27,9 @@ def loads(content: Content) -> list[object] | None:
     if any(found.values()):
         parts.append(_bearings(found))
     if valid:
-        header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
+        header = ["response", "largest torque", "mean torque", "objective f"]
         rows = [_whole(name, one) for name, one in valid.items()]
-        parts.append(_table(header, rows, "Drive, objective, and validity of the contact model"))
+        parts.append(_table(header, rows, "Drive and objective"))
     impacts = [
         [_title(name), joint, *map(Number, cells)]
         for name, one in valid.items()
@@ -48,9 +48,6 @@ def loads(content: Content) -> list[object] | None:
         status = Status(int(one["status"]))
         if not status.valid:
             parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
-    if shown != every:
-        others = ", ".join(name for name in every if name not in shown)
-        parts.append(f"Further responses, in the folder `responses`: {others}.")
     return [*parts, *_remarks(shown)] or None
 
 
@@ -105,13 +102,11 @@ def _row(name: str, one: bearings.Bearing) -> list[object]:
 def _whole(name: str, found: Results) -> list[object]:
     drive = bearings.torque(found)
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
-    validity = bearings.validity(found) if bearings.bearings(found) else "no joint with clearance"
     return [
         _title(name),
         quantity(drive.peak, "N m"),
         quantity(drive.mean, "N m"),
         Number(labels.with_half_width(f, half_width(found), unit)),
-        validity,
     ]
 
 
@@ -127,10 +122,6 @@ def _further(response: Results, alone: bool) -> list[tuple[str, str]]:
         known = f", period {period:.0f}" if np.isfinite(period) else ""
         text = f"{regime.meaning}{known}; {int(response['steady_revolutions'])} revolutions"
         rows.append(("motion", text))
-    unit, spread = str(response["objective"].attrs["units"]), float(response["objective_spread"])
-    rows.append(("objective f", labels.objective(response)))
-    if np.isfinite(spread):
-        rows.append(("cycle-to-cycle std. dev.", labels.quantity(spread, unit, 2)))
     return [*rows, ("force evaluations", f"{int(response['rhs_evaluations'])}")]
 
 

@@ -3,12 +3,11 @@
 import numpy as np
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, PageTable, download, number, preformatted
+from hpcclear.report.html.markup import PageTable, download, number, preformatted
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results
 
-_PARTS = ("busy", "idle", "compile", "write")
-"""What a rank spends time on, variables of kind ``timing``."""
+_PARTS = {"busy": "computing", "idle": "waiting", "compile": "compiling", "write": "writing"}
+"""What a rank spends time on, variables of kind ``timing``, in words."""
 
 
 def scene(content: Content) -> list[object] | None:
@@ -18,38 +17,17 @@ def scene(content: Content) -> list[object] | None:
 
 
 def timing(content: Content) -> list[object] | None:
-    """How every rank spent its time."""
+    """How the ranks spent their time, in sentences; the figure of it has each rank."""
     found = content.get("timing")
     if found is None:
         return None
-    rows: list[list[object]] = []
-    for k, rank in enumerate(found["rank"].to_numpy()):
-        spent = [float(np.sum(found[name][k])) for name in _PARTS]
-        share = spent[0] / sum(spent) if sum(spent) > 0.0 else 0.0
-        row: list[object] = [
-            f"rank {rank}",
-            *(Number(f"{s:.3g}") for s in spent),
-            Number(f"{share:.0%}"),
-        ]
-        if "samples" in found:
-            row.append(Number(int(np.sum(found["samples"][k]))))
-        rows.append(row)
-    header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
-    header += ["samples"] if "samples" in found else []
-    return [*_fared(content, found), PageTable(header, rows, "Time of each rank, all stages")]
-
-
-def _fared(content: Content, found: Results) -> list[object]:
-    """What the run took, in a sentence or two."""
-    spent = {name: float(np.sum(found[name])) for name in _PARTS}
+    spent = {word: float(np.sum(found[name])) for name, word in _PARTS.items()}
     total, count = sum(spent.values()) or 1.0, found.sizes["rank"]
     wall = float(np.sum([found[name].to_numpy().sum(1) for name in _PARTS], axis=0).max())
-    words = (
-        f"{count} {'rank' if count == 1 else 'ranks'} worked on it for {number(wall, 3)} s, "
-        f"{spent['busy'] / total:.0%} of {'its' if count == 1 else 'their'} time on computing."
-    )
+    shares = ", ".join(f"{word} {part / total:.0%}" for word, part in spent.items())
+    words = f"{count} {'rank' if count == 1 else 'ranks'}, {number(wall, 3)} s: {shares}."
     rates = []
-    if "samples" in found and float(np.sum(found["busy"])) > 0.0:
+    if "samples" in found and spent["computing"] > 0.0:
         simulated = found["samples"].to_numpy()
         rate = float(simulated.sum() / found["busy"][simulated > 0].sum())
         rates.append(f"{number(rate, 3)} samples per second and core")
@@ -65,10 +43,7 @@ def reproduce(content: Content) -> list[object]:
     if found is not None:
         steps += ["The command that made these results:"]
         steps += [preformatted(str(found["command"].item()))]
-    words = (
-        "The same scene, seed and versions on the same type of processor give bit-identical results, on "
-        "any number of ranks. `hpcclear reproduce` with this directory simulates some of them again and compares."
-    )
+    words = "`hpcclear reproduce` with this directory simulates some results again and compares, bit for bit."
     rows = [
         [label, content.attribute(name)]
         for label, name in (

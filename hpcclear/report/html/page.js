@@ -63,19 +63,13 @@
   const colour = (name) => `var(--c${Math.max(0, content.front.cases.indexOf(name)) % 4})`;
 
   function marker(svg, point, x, y) {
-    const size = point.kind === "solution" ? (point.direct.length ? 6 : 4) : 7;
-    const hollow = point.kind !== "solution";
-    const style = `--own: ${colour(point.case)}`;
-    const shared = { class: hollow ? "point hollow" : "point", style };
+    const size = 7;
+    const shared = { class: "point hollow", style: `--own: ${colour(point.case)}` };
     if (point.kind === "original") {
       return draw(svg, "rect", { x: x - size, y: y - size, width: 2 * size, height: 2 * size, ...shared });
     }
     if (point.kind === "printed") {
       const d = `M${x},${y - size * 1.3}L${x + size * 1.3},${y}L${x},${y + size * 1.3}L${x - size * 1.3},${y}Z`;
-      return draw(svg, "path", { d, ...shared });
-    }
-    if (content.front.cases.indexOf(point.case) === 1 && !hollow) {
-      const d = `M${x},${y - size * 1.2}L${x + size * 1.1},${y + size}L${x - size * 1.1},${y + size}Z`;
       return draw(svg, "path", { d, ...shared });
     }
     return draw(svg, "circle", { cx: x, cy: y, r: size, ...shared });
@@ -119,8 +113,7 @@
     const below = byId("front-responses");
     below.replaceChildren();
     describe(panel, point);
-    if (point.direct.length) list(panel, "By simulation, with 95 % confidence intervals", point.direct);
-    else put(panel, "p", "Not simulated: a prediction of the surrogate.", { class: "soft" });
+    list(panel, "By simulation, with 95 % confidence intervals", point.direct);
     const one = content.responses[point.response];
     const base = point.response === "original" ? null : content.responses.original;
     if (one) {
@@ -187,12 +180,8 @@
     const reach = (axis, key) => points.flatMap((p) => [p[key], ...((p.intervals && p.intervals[along[axis]]) || [])]);
     const xs = extent(reach(0, "x"), 0.05), ys = extent(reach(1, "y"), 0.05);
     const [x, y] = axes(svg, box, xs, ys, content.front.x, content.front.y, [width < 450 ? 3 : 6, 6]);
-    /* simulated designs are drawn last, on top */
-    const order = points.map((p, k) => k).sort((a, b) => rank(points[a]) - rank(points[b]));
-    function rank(p) { return p.kind === "solution" ? (p.direct.length ? 1 : 0) : 2; }
     const marks = [];
-    for (const k of order) {
-      const p = points[k];
+    for (const [k, p] of points.entries()) {
       bars(svg, p, x, y);
       const mark = marker(svg, p, x(p.x), y(p.y));
       mark.setAttribute("tabindex", "-1");
@@ -226,14 +215,10 @@
     }
     const more = byId("front-more");
     more.ontoggle = () => { if (more.open) detail(panel, points[chosen]); };  /* charts are as wide as there is room for */
-    function further(step) {
-      for (let k = here + step; k >= 0 && k < points.length; k += step) if (points[k].direct.length) return k;
-      return here;
-    }
     svg.addEventListener("keydown", (event) => {
       const keys = {
         ArrowRight: () => move(here + 1), ArrowLeft: () => move(here - 1),
-        ArrowUp: () => move(further(-1)), ArrowDown: () => move(further(1)),
+        ArrowUp: () => move(here - 1), ArrowDown: () => move(here + 1),
         Home: () => move(0), End: () => move(points.length - 1),
         Enter: () => { choose(here); more.open = true; }, " ": () => choose(here),
       };
@@ -243,7 +228,7 @@
     });
     const best = points.findIndex((p) => p.name === content.front.recommended);
     const first = best >= 0 ? best : points.findIndex((p) => content.responses[p.response] && p.kind === "design");
-    choose(first >= 0 ? first : Math.max(0, points.findIndex((p) => p.direct.length)));
+    choose(Math.max(0, first));
   }
 
   function legend(place) {
@@ -253,12 +238,9 @@
       marker(svg, point, 12, 12);
       item.append(` ${words}`);
     };
-    const kinds = new Set(content.front.points.map((p) => p.kind));
-    for (const name of content.front.cases) {
-      if (kinds.has("solution")) entry({ kind: "solution", case: name, direct: [1] }, `${name || "case"}, by the surrogate`);
-    }
+    for (const name of content.front.cases) if (name) entry({ kind: "design", case: name }, name);
     for (const [kind, words] of Object.entries(content.front.legend)) {
-      entry({ kind, case: content.front.cases[0], direct: [] }, words);
+      if (kind !== "design" || !content.front.cases[0]) entry({ kind, case: content.front.cases[0] }, words);
     }
   }
 

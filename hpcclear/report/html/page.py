@@ -17,8 +17,9 @@ from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import PageTable, render
 from hpcclear.report.parts import SectionOf, declared
-from hpcclear.report.screen import Screen
+from hpcclear.report.screen import WORRIES, Screen
 from hpcclear.report.screens import screen_of
+from hpcclear.report.sheet import sheet_of
 from hpcclear.results import files
 from hpcclear.results.names import KINDS
 
@@ -89,20 +90,25 @@ def _page(content: Content) -> str:
     first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
     drawn = gallery.figures(content, troubles)
     still = next((one for one in drawn if one["name"] == gallery.MECHANISM), None)
-    subjects = _subjects(content, [one for one in drawn if one is not still], first, troubles)
+    points = bool(shown and shown["front"]["points"])
+    beside = [name for name in first.figures if name != "front" or not points]
+    folded = [one for one in drawn if one is not still]
+    subjects = _subjects(content, folded, beside, troubles)
     return render(
         "page.html",
-        title=f"Report on {_readable(content.directory.resolve().name)}",
+        title=first.title or f"Report on {_readable(content.directory.resolve().name)}",
+        sheet=sheet_of(content, first),
         policy=_policy(),
         style=_asset("page.css"),
         script=_asset("page.js"),
         picture=shown or {"front": {"points": []}, "responses": {}, "motions": {}},
         source=content.attribute("source") or "hpcclear",
-        screen=first,
+        screen=first.shown(),
+        further=first.trust[WORRIES:],
         spans=any(row.span for row in first.rows),
         still=still,
         motions=bool(shown and shown["motions"]),
-        points=bool(shown and shown["front"]["points"]),
+        points=points,
         anchors=[one.name for one in subjects],
         beside=[one for one in drawn if one["name"] in first.figures],
         subjects=subjects,
@@ -154,7 +160,7 @@ def sections(content: Content, troubles: list[str]) -> Iterator[tuple[SectionOf,
 
 
 def _subjects(
-    content: Content, drawn: list[dict[str, str]], first: Screen, troubles: list[str]
+    content: Content, drawn: list[dict[str, str]], beside: Sequence[str], troubles: list[str]
 ) -> list[Subject]:
     """The folded parts of the page, those with nothing inside left out."""
     found: dict[str, list[tuple[str, str, Sequence[object]]]] = {name: [] for name in SUBJECTS}
@@ -172,9 +178,7 @@ def _subjects(
         found["reproduce"].append(("missing", "Results not available", absent))
     made = []
     for name, (title, hint) in SUBJECTS.items():
-        figures = [
-            one for one in drawn if one["subject"] == name and one["name"] not in first.figures
-        ]
+        figures = [one for one in drawn if one["subject"] == name and one["name"] not in beside]
         if found[name] or figures:
             made.append(Subject(name, title, hint, found[name], figures))
     return made
@@ -197,13 +201,9 @@ def _missing(content: Content, troubles: list[str]) -> list[str]:
     return [*troubles, *words]
 
 
-_OPENED = ("contributions", "tighten first", "next steps", "warning", "negligible")
-"""Lines of the answer that the first screen has."""
-
-
 def _further(content: Content) -> list[object] | None:
     """What else is known of the recommended design of a study, in lines."""
-    rows = [[one.label, one.text] for one in answer(content.files, "") if one.label not in _OPENED]
+    rows = [[one.label, one.text] for one in answer(content.files)]
     return [PageTable(["subject", "result"], rows, "Recommended design")] if rows else None
 
 

@@ -1,12 +1,12 @@
 """The page's section on a paper: its claims, its designs, and how its text can be read."""
 
-from hpcclear.base.objectives import ENDS
+import numpy as np
+
 from hpcclear.base.verdict import Verdict
-from hpcclear.report import beside
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.designs import SIMULATED, names_in, table_of
-from hpcclear.report.html.markup import Number, PageTable, number
+from hpcclear.report.html.markup import PageTable, number
 from hpcclear.report.parts import SectionOf
 
 _BADGES = {
@@ -20,27 +20,19 @@ _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. 
 
 
 def readings(content: Content) -> list[object] | None:
-    """The paper's designs under the possible readings of its text."""
+    """How far the paper's designs are from what it prints, under the possible readings of its text."""
     found = content.get("readings")
     if found is None:
         return None
-    scale = labels.of(found["mean"])
-    names = [str(name) for name in found["design"].to_numpy()]
-    header = ["reading", *(scale.label(name) for name in names), "distance"]
-    rows: list[list[object]] = []
-    if "mean_paper" in found:
-        printed = [number(float(value) * scale.factor) for value in found["mean_paper"].to_numpy()]
-        rows.append(["printed in the paper", *printed, Number("–")])
-    for k in range(found.sizes["reading"]):
-        one = found.isel(reading=k)
-        cells = [number(float(value) * scale.factor) for value in one["mean"].to_numpy()]
-        distance = number(float(one["distance"]), 3) if "distance" in one else Number("–")
-        rows.append([one["reading"].item(), *cells, distance])
+    readings = found["reading"].to_numpy()
+    distances = found["distance"].to_numpy() if "distance" in found else [np.nan] * len(readings)
+    rows = [[str(one), number(far, 3)] for one, far in zip(readings, distances, strict=True)]
     words = (
-        "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
+        "By how the paper's text is read, the means of f of its designs differ from the printed ones: root mean square of "
         "ln(mean / printed mean)."
     )
-    return [words, PageTable(header, rows, "Effect of ambiguities in the paper")]
+    table = PageTable(["reading", "distance"], rows, "Effect of ambiguities in the paper")
+    return [words, table]
 
 
 def claims(content: Content) -> list[object] | None:
@@ -50,37 +42,29 @@ def claims(content: Content) -> list[object] | None:
         return None
     verdicts = found["verdict"].to_numpy().tolist()
     counts = [verdicts.count(verdict) for verdict in Verdict]
-    held = (
-        f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, {counts[1]} do not, and "
-        f"{counts[2]} are undecided."
-    )
+    held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
     rows = []
     for k in range(found.sizes["claim"]):
         one = found.isel(claim=k)
         badge = _BADGES[Verdict(int(one["verdict"]))]
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge])
-    title = "Claims of the paper, tested on this data; claims.nc has the numbers that decide"
+    title = "Claims of the paper; claims.nc has the numbers that decide"
     return [held, PageTable(["claim", "verdict"], rows, title)]
 
 
 def designs_of_a_paper(content: Content) -> list[object]:
-    """Words and table of the designs that a publication prints, beside the optimised ones; nothing without any."""
+    """Words and table of the designs that a publication prints; nothing without any."""
     verified = content.get("verification")
     if verified is None or not content.is_compared:
         return []
-    ends = [f"{case} {end}" for case in beside.roles(verified) for end in ENDS]
-    printed = [name for name in names_in(verified) if labels.is_printed(verified.sel(design=name))]
-    names = [name for name in names_in(verified) if name in ends or name in printed]
+    names = [name for name in names_in(verified) if labels.is_printed(verified.sel(design=name))]
     words = (
-        "Mean and standard deviation of f: by simulation with 95 % half-widths, and as the paper prints them in its Table 4. "
         "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
         "nothing was fitted to them."
     )
     columns = (*SIMULATED[:2], *_PRINTED)
-    table = table_of(
-        verified, {name: name for name in names}, columns, "Table 4: this study and the paper"
-    )
-    return [words, table]
+    title = "Table 4: designs of the paper, by simulation with 95 % half-widths and as printed"
+    return [words, table_of(verified, {name: name for name in names}, columns, title)]
 
 
 def paper(content: Content) -> list[object] | None:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from hpcclear.report.figures import labels, motion, moving, sketch
-from hpcclear.report.figures.designs import searched
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 from hpcclear.report.merit import goals_of, leading_goals, recommended
@@ -36,42 +35,31 @@ def picture(content: Content) -> dict[str, Any]:
 
 
 def front(content: Content) -> dict[str, Any]:
-    """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them.
+    """Axes and points of the interactive front: the designs that were simulated, where the simulation puts them.
 
     At first the axes are the two objectives of the case that the answer is about; where a case has others than mean and
     standard deviation of f, the reader may choose the axes. Points have no place along an axis that is no objective of their
     case."""
-    fronts, verified = content.get("front"), content.get("verification")
-    points: list[dict[str, Any]] = []
-    if fronts is not None:
-        points += _solutions(fronts, verified)
-    if verified is not None:
-        points += [_design(verified.isel(design=k)) for k in range(verified.sizes["design"])]
+    verified = content.get("verification")
+    if verified is None:
+        return {"points": []}
+    points = [_design(verified.isel(design=k)) for k in range(verified.sizes["design"])]
     points = [p for p in points if all(np.isfinite(p["goals"][word][1]) for word in _USUAL)]
     if not points:
         return {"points": []}
-    axes = _placed(points, _leading(fronts, verified))
+    asked = leading_goals(verified)
+    axes = _placed(points, asked[:2] if len(asked) > 1 else _USUAL)
     points.sort(key=lambda point: [np.inf if point[k] is None else point[k] for k in "xy"])
+    kinds = {point["kind"] for point in points}
     return {
         "x": axes[0],
         "y": axes[1],
         **({"axes": axes} if len(axes) > 2 else {}),
-        "recommended": recommended(verified) if verified is not None else "",
+        "recommended": recommended(verified),
         "cases": sorted({point["case"] for point in points}),
         "points": points,
-        "legend": {
-            kind: text for kind, text in _LEGEND.items() if kind in {p["kind"] for p in points}
-        },
+        "legend": {kind: text for kind, text in _LEGEND.items() if kind in kinds},
     }
-
-
-def _leading(fronts: Results | None, verified: Results | None) -> Sequence[str]:
-    """The first two objectives of the case that the answer is about, else of the first case; mean and standard deviation by
-    default."""
-    asked = leading_goals(verified) if verified is not None else []
-    if not asked and fronts is not None:
-        asked = [words for words, _ in searched(fronts.isel(case=0)).values()]
-    return asked[:2] if len(asked) > 1 else _USUAL
 
 
 def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
@@ -107,33 +95,28 @@ Goal = tuple[str, float] | tuple[str, float, float, float]
 """Unit and value of an objective, and the ends of its confidence interval where that is known."""
 
 
-def _usual(one: Results, ending: str) -> dict[str, Goal]:
+def _usual(one: Results) -> dict[str, Goal]:
     """Mean and standard deviation of f, which every design has, by their words."""
     return {
         words: (
-            str(one[f"{name}{ending}"].attrs["units"]),
-            float(one[f"{name}{ending}"]),
-            *_ends(one, name, ending),
+            str(one[f"{name}_true"].attrs["units"]),
+            float(one[f"{name}_true"]),
+            *_ends(one, name),
         )
         for words, name in zip(_USUAL, ("mean", "deviation"), strict=True)
     }
 
 
-def _ends(one: Results, name: str, ending: str = "_true") -> tuple[()] | tuple[float, float]:
+def _ends(one: Results, name: str) -> tuple[()] | tuple[float, float]:
     """Ends of the confidence interval of a simulated value; nothing where they are not known."""
-    if ending != "_true" or f"{name}_lower" not in one:
+    if f"{name}_lower" not in one:
         return ()
     ends = float(one[f"{name}_lower"]), float(one[f"{name}_upper"])
     return ends if np.isfinite(np.array(ends)).all() else ()
 
 
-def _searched(one: Results) -> dict[str, Goal]:
-    """What the case of a solution makes small, by the surrogate: unit and value by its words."""
-    return {words: (unit or "1", float(one[name])) for name, (words, unit) in searched(one).items()}
-
-
 def _verified(one: Results) -> dict[str, Goal]:
-    """The same of a design, by simulation."""
+    """What the case of a design makes small, by simulation: unit and value by its words."""
     return {
         str(one[f"{name}_goal"].item()): (
             str(one[f"{name}_unit"].item()) or "1",
@@ -142,43 +125,6 @@ def _verified(one: Results) -> dict[str, Goal]:
         )
         for name in goals_of(one)
     }
-
-
-def _solutions(fronts: Results, verified: Results | None) -> list[dict[str, Any]]:
-    """The swarm's solutions by the surrogate, each with its direct simulation where there is one."""
-    found = []
-    variables = labels.design_variables(fronts)
-    places = np.argwhere(np.isfinite(fronts["mean"].to_numpy()))
-    for place in places:
-        one = fronts.isel(dict(zip(fronts["mean"].dims, place.tolist(), strict=True)))
-        case = str(one["case"].item())
-        direct = _same(one, verified, case, [str(v.name) for v in variables])
-        found.append(
-            {
-                "kind": "solution",
-                "name": f"run {int(one['run'])}, solution {int(one['solution'])}",
-                "case": case,
-                "design": _values(one),
-                "surrogate": _moments(one, "mean", "deviation"),
-                "direct": [] if direct is None else simulated(direct),
-                "response": "",
-                "goals": _usual(one, "") | _searched(one),
-            }
-        )
-    return found
-
-
-def _same(one: Results, verified: Results | None, case: str, names: list[str]) -> Results | None:
-    """The verified design of the same case and values."""
-    if verified is None or not set(names) <= set(map(str, verified.data_vars)):
-        return None
-    fit = np.ones(verified.sizes["design"], bool)
-    if "case" in verified:
-        fit = verified["case"].to_numpy() == case
-    for name in names:
-        fit &= np.isclose(verified[name].to_numpy(), float(one[name]), rtol=1e-9, atol=0.0)
-    found = np.flatnonzero(fit)
-    return None if found.size == 0 else verified.isel(design=int(found[0]))
 
 
 def _design(one: Results) -> dict[str, Any]:
@@ -196,7 +142,7 @@ def _design(one: Results) -> dict[str, Any]:
         "surrogate": surrogate,
         "direct": simulated(one),
         "response": "original" if is_original else name,
-        "goals": _usual(one, "_true") | _verified(one),
+        "goals": _usual(one) | _verified(one),
     }
 
 

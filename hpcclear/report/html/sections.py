@@ -6,15 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 import tomli_w
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
-from hpcclear.report.html.content import Content
+from hpcclear.report.html.content import Content, scene_in
 from hpcclear.report.html.markup import Number, PageTable, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
-from hpcclear.scene.loading import parse, scene_of_text
+from hpcclear.scene.loading import parse
 
 LISTED = 40  # samples listed by number before the rest is only counted
 
@@ -57,12 +56,10 @@ def _changes(found: Results, seconds: effects.Times) -> PageTable:
 def _changed(found: Results) -> str:
     """Tables of the scene that change where what can be neglected is left out, as TOML to paste; "" if nothing can."""
     chosen = int(np.argmax(found["recommended"].to_numpy()))
-    try:
-        whole = scene_of_text(str(found.attrs["scene"]), "scene").resolved()
-    except InputError:
-        return ""  # of another version
-    if not chosen:
+    scene = scene_in(str(found.attrs["scene"]))
+    if not chosen or scene is None:
         return ""
+    whole = scene.resolved()
     reduced = parse(found.attrs["reduced_scene"], "reduced scene")
     changed = {key: value for key, value in reduced.items() if whole.get(key) != value}
     gone = [key for key in whole if key not in reduced]
@@ -107,10 +104,8 @@ def compared(content: Content) -> list[object] | None:
 
 def _thresholds(samples: Results) -> list[spread.Beyond]:
     """Values of f that the cases of the study keep below, or whose exceedance they make small."""
-    try:
-        study = scene_of_text(str(samples.attrs.get("scene", "")), "scene").study
-    except InputError:
-        return []
+    scene = scene_in(str(samples.attrs.get("scene", "")))
+    study = None if scene is None else scene.study
     goals = [
         goal
         for case in (study.cases if study else ())

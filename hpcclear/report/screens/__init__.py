@@ -22,7 +22,10 @@ def screen_of(content: Content) -> Screen | None:
     modules = [import_module(f"{__name__}.{name}") for name, own in _OF.items() if own & kinds]
     made = (make(content) for module in modules for make in module.SCREENS)
     first: Screen | None = next((one for one in made if one is not None), None)
-    if first is None or not content.troubles:
+    if first is None:
+        return None
+    first = replace(first, title=content.attribute("about_title"))
+    if not content.troubles:
         return first
     lost = Trust(Level.RED, f"Not all files are here: {content.troubles[0]}", "reproduce")
     return replace(first, trust=trusted([*first.trust, lost]))

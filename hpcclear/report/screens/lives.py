@@ -16,9 +16,6 @@ from hpcclear.statistics.random.survival import fewest, order_interval, quantile
 
 HOUR = 3600.0
 
-DOMINATES = 0.5
-"""Share of the variance of ranks from which on an input is said to decide."""
-
 REASONS = {
     "cycles": "after wear.cycles, no limit reached",
     "clearance": "at wear.limit.clearance",
@@ -162,23 +159,16 @@ def doubts(content: Results) -> list[str]:
 
 
 def section(content: Content) -> list[object] | None:
-    """All that is known of service lives, in lines."""
+    """What is known of service lives besides the first screen, in lines."""
     lives = content.get("wear")
-    if lives is None:
+    if lives is None or not followed(lives).any():
         return None
-    rows: list[list[object]] = [["failed", text] for text in _failed(lives)]
     reasons = lives["end_reason"].to_numpy()
+    rows: list[list[object]] = []
     for name, words in REASONS.items():
         if count := int((reasons == name).sum()):
             rows.append(["ended", f"{count} {words}"])
-    rows += [["warning", text] for text in doubts(lives)]
-    for name, new, end, reach in _clearances(lives):
-        text = f"median initial {new}, final {end}" + (f" (5 to 95 %: {reach})" if reach else "")
-        rows.append([f"clearance {name}", text])
     rows += [*_lifetimes(lives), *_profiles(lives)]
-    for joint, name, share in _inputs(lives):
-        word = "dominant" if share >= DOMINATES else "largest"
-        rows.append([f"{word} input, {joint}", f"{name}, squared rank correlation {share:.2f}"])
     return [PageTable(["quantity", "result"], rows, "Service lives")]
 
 
@@ -228,9 +218,6 @@ def _lifetimes(lives: Results) -> list[list[object]]:
         ]
         text = "median {}; 5th percentile {}; 95th percentile {}".format(*texts)
         rows.append([f"service life, {unit}", text])
-    interval = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
-    text = f"{float(last['survival']):.3g} of the service lives ({interval})"
-    rows.append([f"survival, {_long(cycles)} rev.", text])
     for name in lives["joint"].to_numpy() if "exceedance" in lives else ():
         one = last.sel(joint=name)
         low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])

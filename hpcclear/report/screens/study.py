@@ -11,10 +11,18 @@ from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Status
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import alike, scatter
-from hpcclear.report.answer import FAR, MANY, beyond_hertz, steps, surrogate_errors, unit_of
+from hpcclear.report.answer import (
+    FAR,
+    MANY,
+    beyond_hertz,
+    confidence,
+    steps,
+    surrogate_errors,
+    unit_of,
+)
 from hpcclear.report.constraints import ABSENT, OPEN, WORDS, verdict_of
 from hpcclear.report.figures import fits, labels
-from hpcclear.report.html.content import Content
+from hpcclear.report.html.content import Content, scene_in
 from hpcclear.report.merit import (
     baseline_of,
     best_of,
@@ -40,12 +48,9 @@ from hpcclear.report.screen import (
 )
 from hpcclear.results.content import Results
 from hpcclear.scene.domain import bound_at, shares
-from hpcclear.scene.loading import scene_of_text
 
 MOST = 0.5
 """Share of simulations outside the range of the contact model above which a recommendation is not relied on."""
-
-TILES = 4
 
 _USUAL = {"mean": "mean", "deviation": "standard deviation", "percentile": "95th percentile"}
 """Statistics that each design has, by the stem of their variables."""
@@ -65,7 +70,7 @@ def screen(content: Content) -> Screen | None:
     best, base = best_of(ours), baseline_of(ours)
     of = Recommended(content.files, ours, best)
     kept = base is not None and str(base["design"].item()) == str(best["design"].item())
-    tiles = list(_tiles(best, None if kept else base, content))[:TILES]
+    tiles = list(_tiles(best, None if kept else base, content))
     bars, causes = _bars(of)
     rows = tuple(_rows(best, None if kept else base))
     infeasible = verdict_of(best) in _INFEASIBLE
@@ -83,6 +88,7 @@ def screen(content: Content) -> Screen | None:
         causes,
         tuple(steps(of)),
         ("front",) if "front" in content.files else (),
+        (confidence(best),),
     )
 
 
@@ -213,8 +219,10 @@ def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
 
 def _spans(best: Results, base: Results | None) -> dict[str, Span]:
     """Where the variables of a design lie in their ranges, by name; none where the scene does not say."""
+    scene = scene_in(str(best.attrs.get("scene", "")))
+    if scene is None:
+        return {}
     try:
-        scene = scene_of_text(str(best.attrs.get("scene", "")), "scene")
         known = scene.study.names if scene.study is not None else ()
         designs = [
             {

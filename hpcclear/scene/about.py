@@ -1,0 +1,51 @@
+"""What a machine is called and who answers for it: texts that pages and files show, and that change no result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from hpcclear.scene.fields import Converted, Table, invalid
+
+LONGEST = 120
+"""Letters of a text."""
+
+
+@dataclass(frozen=True)
+class ShortText(Converted):
+    """A text of one line."""
+
+    def convert(self, value: object) -> str:
+        """The text without blanks around it; an error for validators where it is none."""
+        if not isinstance(value, str):
+            raise invalid("a text is expected here", 'Write it in quotation marks: "B"')
+        text = value.strip()
+        if not (0 < len(text) <= LONGEST and text.isprintable()):
+            reason = f"must be one line of 1 to {LONGEST} letters"
+            raise invalid(reason, "Shorten it, or remove the entry")
+        return text
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "minLength": 1, "maxLength": LONGEST}
+
+
+def inputs_of(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what results follow from: the content of a scene but for [about]."""
+    return {name: table for name, table in content.items() if name != "about"}
+
+
+class About(Table):
+    """What pages, the printed sheet, the terminal and files show of a machine. It changes no result and no hash."""
+
+    title: Annotated[str, ShortText()] | None = None
+    """What the study is about, such as "Compressor K12, connecting rod"."""
+    author: Annotated[str, ShortText()] | None = None
+    """Who answers for it."""
+    revision: Annotated[str, ShortText()] | None = None
+    """Of the study or drawing, such as "B"."""
+    machine: Annotated[str, ShortText()] | None = None
+    """The machine, such as its type and serial number."""
