@@ -63,8 +63,8 @@ def draw(
     for points in others.bodies.values() if others is not None else ():
         sheet.line(around(list(points.values())), _OTHER, 1.0, ls=(0, (4, 2)), zorder=1)
     _Drawing(sheet, scene, placed, changed, gain).everything()
-    enlarged = f"clearances enlarged {gain:g} times, " if gain else ""
-    return f"○ mass centre; bars to scale, {enlarged}pins not to scale"
+    enlarged = f"clearances enlarged {gain:g} times; " if gain else ""
+    return f"○ mass centre; {enlarged}pins not to scale"
 
 
 class _Drawing(NamedTuple):

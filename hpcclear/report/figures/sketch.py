@@ -76,7 +76,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
     return figure
 
 
-_PICTURE = 120.0  # mm of width of a drawing alone
+_PICTURE = 95.0  # mm of width of a drawing alone
 
 
 @style.drawn

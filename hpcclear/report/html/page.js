@@ -341,7 +341,9 @@
     select.addEventListener("change", () => load(select.value));
     gain.addEventListener("input", () => show(frame));
     at.addEventListener("input", () => { play(false); show(Number(at.value)); });
-    load(names[0]);
+    const recommended = content.front.recommended;
+    select.value = names.includes(recommended) ? recommended : names[0];
+    load(select.value);
     play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
   }
 
