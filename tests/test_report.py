@@ -198,7 +198,7 @@ def test_the_crank_is_found_from_the_motion() -> None:
     bearing = rod - 0.06 * np.column_stack([np.cos(along), np.sin(along)])
     response["eccentricity_x"][:, 0] = crank[:, 0] - bearing[:, 0]
     response["eccentricity_y"][:, 0] = crank[:, 1] - bearing[:, 1]
-    points = np.array(picture.frames(response)["points"])
+    points = np.array(picture.frames(response, response)["points"])
     np.testing.assert_allclose(np.hypot(points[:, 2], points[:, 3]), 0.05, rtol=1e-5)  # six digits
 
 
