@@ -95,8 +95,8 @@ def test_order_of_variables_counts() -> None:
 def test_differences_name_key_and_both_values(scene: Scene) -> None:
     other = scene.with_({"mechanism.rod.mass": 0.3, "numerics.atol": 1e-9})
     assert differences(scene, other) == [
-        "mechanism.rod.mass: 0.21 -> 0.3",
-        "numerics.atol: '(not set)' -> 1e-09",
+        "mechanism.rod.mass: 0.21 kg -> 0.3 kg",
+        "numerics.atol: (not set) -> 1e-09",
     ]
     assert differences(scene, scene) == []
 

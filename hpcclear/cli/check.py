@@ -107,10 +107,10 @@ def _speeds(scene: Scene) -> list[tuple[str, str]]:
 
 
 def _in_turns(scene: Scene, path: str) -> str:
-    """An angular speed that was written in radians, in rpm too."""
+    """An angular speed that was not written in rpm, in rpm too."""
     turns = f"{30.0 * scene.number(path) / np.pi:.6g} rpm"
-    radians = scene.unit(path) == "rad/s" and "rad" in scene.shown(path)
-    return f" ({turns})" if radians else ""
+    other = scene.unit(path) == "rad/s" and not scene.shown(path).endswith("rpm")
+    return f" ({turns})" if other else ""
 
 
 def _tables(scene: Scene) -> list[tuple[str, str]]:

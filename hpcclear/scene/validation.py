@@ -12,7 +12,7 @@ from hpcclear.base.units import factor, is_written_in, noting
 from hpcclear.base.written import reading
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
-from hpcclear.scene.fields import Content, Table, hint, invalid, nearest
+from hpcclear.scene.fields import LARGEST, Content, Table, hint, invalid, nearest
 from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
@@ -260,8 +260,8 @@ def _wrong(
     names: tuple[str, ...], found: object, reason: str, remedy: str, more: int
 ) -> InputError:
     key = ".".join(names)
-    usual = _USUAL.get(_unit(key)) if re.search(r"\bmust\b|than", reason) else None
-    if usual and isinstance(found, (int, float)) and found > 0:
+    usual = _USUAL.get(_unit(key)) if re.search("smaller|below|at most|fit into", reason) else None
+    if usual and isinstance(found, (int, float)) and 0 < found < LARGEST:
         size = found / float(factor(usual, _unit(key)))
         meant = f'if {usual} are meant, write "{found:g} {usual}"'
         remedy += f". {found:g} is {size:.6g} {usual}; {meant}"
