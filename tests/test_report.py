@@ -24,7 +24,7 @@ from hpcclear.report.html import markup, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
 from hpcclear.report.screen import Screen
-from hpcclear.report.sheet import Sheet
+from hpcclear.report.sheet import SheetContent
 
 
 class Tree(HTMLParser):
@@ -208,7 +208,7 @@ def test_data_for_the_script_cannot_end_its_element() -> None:
     lists = dict.fromkeys(("beside", "subjects", "anchors", "further"), ())
     flags = dict.fromkeys(("spans", "motions", "points"), False)
     first = Screen("nothing")
-    sheet = Sheet(first, (), (), ())
+    sheet = SheetContent(first, (), (), ())
     made = markup.render(
         "page.html", **texts, **lists, **flags, screen=first, picture=hostile, sheet=sheet
     )

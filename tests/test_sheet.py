@@ -19,7 +19,7 @@ from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
 from hpcclear.report.screen import Level, Screen, ScreenRow, Span, Tile, Trust, trusted
 from hpcclear.report.screens import screen_of
-from hpcclear.report.sheet import Sheet
+from hpcclear.report.sheet import SheetContent
 
 QUICKSTART = Path(__file__).parents[1] / "jobs" / "quickstart.toml"
 
@@ -41,7 +41,7 @@ def text_of(rng: np.random.Generator, words: int) -> str:
     return " ".join(rng.choice(WORDS, words))
 
 
-def generated(seed: int, most: int) -> Sheet:
+def generated(seed: int, most: int) -> SheetContent:
     """A sheet of words that are long, with up to so many verdicts, columns and rows."""
     rng = np.random.default_rng(seed)
 
@@ -69,7 +69,7 @@ def generated(seed: int, most: int) -> Sheet:
     axes[0, 0].imshow(picture)
     png = style.render(figure, dpi=50)
     origin = zip(("machine", "author", "inputs", "software"), some(4), strict=True)
-    return Sheet(
+    return SheetContent(
         replace(first, title=text_of(rng, 14)), tuple(origin), tuple(some(3)), tuple(some(6)),
         tuple((png, one) for one in some(int(rng.integers(0, 3)))),
     )  # fmt: skip
@@ -118,7 +118,7 @@ def test_of_40_verdicts_the_red_ones_stay_and_the_rest_is_counted() -> None:
         )
         for k in range(40)
     ]
-    figure = sheets.draw(Sheet(Screen("Verdicts", trust=trusted(lines)), (), (), ()))
+    figure = sheets.draw(SheetContent(Screen("Verdicts", trust=trusted(lines)), (), (), ()))
     texts = [one.get_text() for one in figure.texts]
     assert texts.count("■ red") == 4
     (left,) = [text for text in texts if text.startswith("and ")]

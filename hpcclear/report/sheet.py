@@ -47,7 +47,7 @@ _SOFT = "#57606a"
 _HEAD = ("machine", "author", "revision", "date of the data")
 
 
-class Sheet(NamedTuple):
+class SheetContent(NamedTuple):
     """What stands on a sheet."""
 
     screen: Screen
@@ -97,7 +97,7 @@ def write_sheet(*places: str | Path, output: str | Path | None = None) -> Path:
     return style.save(figure, content.directory / NAME if output is None else output)
 
 
-def sheet_of(content: Content, screen: Screen | None) -> Sheet:
+def sheet_of(content: Content, screen: Screen | None) -> SheetContent:
     """Return what stands on the sheet of results, without its figures."""
     known = np.isfinite(content.dated)
     origin = {
@@ -113,7 +113,7 @@ def sheet_of(content: Content, screen: Screen | None) -> Sheet:
     }
     first = screen or Screen("Not all results have a first screen")
     title = content.attribute("about_title") or f"Results in {content.directory.resolve().name}"
-    return Sheet(
+    return SheetContent(
         replace(first, title=title),
         tuple((label, text) for label, text in origin.items() if text),
         tuple(_assumptions(content)),
@@ -170,7 +170,7 @@ Placed = list[tuple[float, float, float, str, _Cell]]
 """Lines of text: place from the upper left corner, mm, size, text and look."""
 
 
-def _blocks(sheet: Sheet) -> list[list[list[_Cell]]]:
+def _blocks(sheet: SheetContent) -> list[list[list[_Cell]]]:
     """The parts of the sheet in rows of cells; a row of one cell has the whole width."""
     first = sheet.screen
     head = [
@@ -225,7 +225,7 @@ def _placed(
     return placed, y
 
 
-def _fitting(sheet: Sheet) -> tuple[Placed, float]:
+def _fitting(sheet: SheetContent) -> tuple[Placed, float]:
     """All text in its place, as large as it may be; where even the smallest is too much, the longest parts are cut."""
     blocks, room = _blocks(sheet), FLOOR - (LOW if sheet.pictures else 0.0)
     shown = [min(len(block), MOST) for block in blocks]
@@ -292,7 +292,7 @@ def _wrapped(cell: _Cell, width: float, size: float) -> list[str]:
     return [*lines, line]
 
 
-def draw(sheet: Sheet) -> "style.Figure":
+def draw(sheet: SheetContent) -> "style.Figure":
     """Return the sheet as a figure of the size of A4."""
     from matplotlib.figure import Figure
     from matplotlib.image import imread

@@ -43,7 +43,7 @@ def failures_of(study: Study, case: Case) -> list[Constraint]:
     return [one for one in case.kept if one.statistic == "exceedance" and 0.0 < one.most < PLENTY]
 
 
-class Block(NamedTuple):
+class WeightedDraws(NamedTuple):
     """Weighted draws of a design for one of its constraints: standard normals (n, inputs), weights of those that fail (n,)."""
 
     constraint: int
@@ -66,7 +66,7 @@ class Failures:
     def __init__(self, run: StudyRun, case: Case, rng: np.random.Generator) -> None:
         self._run, self._rng, self._inputs = run, rng, len(case.random)
         self.goals, self.densities = failures_of(run.study, case), list[Density]()
-        self.drawn: dict[int, list[Block]] = {}
+        self.drawn: dict[int, list[WeightedDraws]] = {}
 
     def prepare(self, choice: Choice) -> None:
         """Find the densities of the failures of a design of which nothing is known."""
@@ -80,7 +80,7 @@ class Failures:
             weights, where = self.densities[k].weights(u), [(choices[row], u) for row in rows]
             for row, values in zip(rows, rare.simulated(self._run, where, "search"), strict=True):
                 failing = values[max(goal.place - 1, 0)] > goal.limit
-                block = Block(k, u, np.where(failing, weights, 0.0))
+                block = WeightedDraws(k, u, np.where(failing, weights, 0.0))
                 self.drawn.setdefault(row, []).append(block)
             self.densities[k] = self._renewed(k)
 

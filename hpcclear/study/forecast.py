@@ -26,10 +26,10 @@ from hpcclear.scene.streams import generator
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import (
+    budget,
     extent,
     goals,
     optimisation,
-    search,
     truth,
     verdicts,
 )
@@ -113,7 +113,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     first = min(looks) * REPLICATES
     fixed = sum(chosen_in_all(study)) / len(study.cases)
     for case, its in zip(study.cases, each, strict=True):
-        designs = search.designs(study, case) if study.verification.infill_rounds else fixed
+        designs = budget.designs(study, case) if study.verification.infill_rounds else fixed
         deciding = designs if study.verification.draws else min(ENDS, designs)
         rares = verdicts.usual_in(case, study.verification)
         found["verification"] += deciding * its + (designs - deciding + 1) * min(first, its)
@@ -128,7 +128,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
 
 def _searched(study: Study) -> float:
     """Simulations of a search, as a rule."""
-    first, further = search.simulations(study)
+    first, further = budget.simulations(study)
     return first + SPENT * further
 
 

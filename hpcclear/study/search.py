@@ -25,82 +25,34 @@ from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
-from hpcclear.scene.study import Study
-from hpcclear.statistics.random import importance
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import NEAR, Beliefs, Known, Space
 from hpcclear.statistics.search.pareto import cut
-from hpcclear.study import goals, truth
-from hpcclear.study.failures import CLOSE, FEW, PILOT, Failures, excess_of, failures_of
-from hpcclear.study.optimisation import Choice, choices, chosen_in_all, distinct
+from hpcclear.study import contest, goals, truth
+from hpcclear.study.budget import AIM, AIMS, HEDGES, OFF, SETTLED, SURE, all_over, first_length
+from hpcclear.study.failures import CLOSE, FEW, Failures, excess_of
+from hpcclear.study.optimisation import Choice, choices, distinct
 from hpcclear.study.run import Result, StudyRun
 
-WIDE, PARTS = 4, 3
-"""Designs per design variable all over the box at first; parts that `infill_designs` are simulated in, since each new design
-says where the next belongs."""
-
-FIRST = 4
-"""Points of each replicate that a design gets at first, or half of what it may have."""
+PARTS = 3
+"""Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
 WORTH, PATIENCE = 0.1, 2
 """Of the accuracy requested: what another design or more simulations are worth at least; rounds in a row that are not, after
 which the search ends."""
 
-LEADERS, HEDGES, AWAY = 3, 3, 0.05
-"""Designs that get more simulations first; designs to verify that only may be the best, since what is believed of neighbours is
-off together; and how far off they are, over the ranges."""
-
-AIM, AIMS = 0.8, (0.88, 0.78, 0.65)
-"""Probability that is sought, over the largest that is allowed: so much below it can be shown; and of the designs that are
-verified, of which one nearer to the threshold may stay undecided."""
-
-OFF = 1.0, 2.0
-"""Standard errors of the constraints by which further designs keep them: all designs meet the same scatter, so that what few
-simulations get wrong they get wrong of all, and designs along the threshold break or keep it together."""
+LEADERS, AWAY = 3, 0.05
+"""Designs that get more simulations first; how far `HEDGES` are off others, over the ranges."""
 
 SMALL, SHOWN = 0.012, 3.0
 """Of the same for other statistics than probabilities: 0.24 % below the threshold is sought; and standard errors after the most
 simulations that a verified design may have, by which the last of `AIMS` keeps its constraints."""
 
-SETTLED, SURE, AGREE = 5, 64, (0.04, 0.001)
-"""Designs at the threshold that are looked at closely in the end, at most; weighted draws of each repeat there; and how well
-the model has to know the last one: its index, some 10 % of a probability, or another statistic over its threshold."""
-
-
-def simulations(study: Study) -> tuple[int, int]:
-    """Simulations of the first designs, and of all that follow, at most."""
-    if study.verification.infill_rounds == 0:
-        return 0, 0
-    first = sum(chosen_in_all(study)) + sum(_wide(study, case) for case in study.cases)
-    settings, most = study.verification, truth.search_length(study) * REPLICATES
-    further = settings.infill_rounds * settings.infill_designs * len(study.cases) * most
-    further += first * (most - first_length(study) * REPLICATES)
-    failures = sum(len(failures_of(study, case)) for case in study.cases)
-    designs = settings.infill_rounds * settings.infill_designs
-    draws = importance.LEVELS * PILOT + (designs * FEW + SETTLED * SURE) * importance.REPEATS
-    settled = sum(SETTLED for case in study.cases if any(not one.exact for one in case.kept))
-    return first * first_length(study) * REPLICATES, further + settled * most + failures * draws
-
-
-def first_length(study: Study) -> int:
-    """Points of each replicate that a design gets at first: a power of two."""
-    return min(max(truth.search_length(study) // 2, 2), FIRST)
-
-
-def _wide(study: Study, case: Case) -> int:
-    """Designs all over the box that the search of a case begins with."""
-    size = len(study.design_variables(case.name))
-    return max(WIDE * size, size + 4)
-
-
-def designs(study: Study, case: Case) -> int:
-    """Designs of a case that are verified, at most."""
-    directions = len(case.goals) + case.plain
-    front = study.verification.designs if len(case.goals) > 1 else 0
-    kept = len(AIMS) + len(OFF) if any(not one.exact for one in case.kept) else 0
-    return 2 * directions + max(HEDGES, front and max(front, len(case.goals))) + kept
+AGREE = 0.04, 0.001
+"""How well the model has to know the last of `SETTLED`: its index, some 10 % of a probability, or another statistic over its
+threshold."""
 
 
 def search(run: StudyRun, start: Sequence[Choice]) -> Result:
@@ -202,7 +154,7 @@ class CaseSearch:
         self._most = settings.infill_rounds * settings.infill_designs
         self._batch = max(settings.infill_designs // PARTS, 1)
         self._idle, self._hope = 0, 0.0
-        unit = unit_lhs(_wide(run.study, case), len(self._names), self._rng)
+        unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
         wide = choices(run, case.name, region.lower + unit * (region.upper - region.lower))
         self.choices = distinct([*start, *wide])
         self._begun = len(self.choices)
@@ -284,7 +236,9 @@ class CaseSearch:
     def _accuracy(self, beliefs: Beliefs, direction: Array) -> float:
         """The accuracy requested in a direction, at the best design that is known."""
         known = beliefs.believed[beliefs.finite]
-        return truth.size_of(self._run, self._case, direction, known[(known @ direction).argmin()])
+        return contest.size_of(
+            self._run, self._case, direction, known[(known @ direction).argmin()]
+        )
 
     def _added(self, points: Array) -> list[int]:
         """Numbers of new designs at sampling coordinates, (n, d)."""

@@ -15,6 +15,7 @@ from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
+    budget,
     certificate,
     chaos,
     contributions,
@@ -181,7 +182,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 
 def _of_search(scene: Scene) -> dict[str, int]:
-    return {"search": sum(search.simulations(scene.required_study))}
+    return {"search": sum(budget.simulations(scene.required_study))}
 
 
 def _designs(scene: Scene) -> int:
@@ -190,7 +191,7 @@ def _designs(scene: Scene) -> int:
     found = sum(optimisation.chosen_in_all(study))
     if study.verification.infill_rounds:
         papers = optimisation.chosen_in_all(study)[0] * is_the_papers(scene)
-        found = papers + sum(search.designs(study, case) for case in study.cases)
+        found = papers + sum(budget.designs(study, case) for case in study.cases)
     return found + len(study.cases) + len(printed_designs(scene))  # the original, in each case
 
 

@@ -15,7 +15,7 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import bound_at, shares
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import truth
+from hpcclear.study import contest
 from hpcclear.study.goals import excess, most_of, names_of, wanted
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
@@ -150,7 +150,7 @@ def _name_case(
         each = true["verdict"][rows, : len(kept)].astype(int).tolist()
         ours = _nearest(ours, [together(one) for one in each], broken)
     least = np.nanmin(values[ours], axis=0, initial=np.inf)
-    near = np.array([truth.size_of(run, case, one, least) for one in np.eye(count)])
+    near = np.array([contest.size_of(run, case, one, least) for one in np.eye(count)])
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence, near)
     known = mine.known.any()
     ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count

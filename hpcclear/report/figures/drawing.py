@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.report.figures import labels, style
-from hpcclear.report.figures.lettering import Sheet
+from hpcclear.report.figures.lettering import Lettering
 from hpcclear.report.figures.placed import Placed, Pose
 from hpcclear.scene import Scene
 
@@ -57,7 +57,7 @@ def draw(
     others = None if before is None else Placed(before[0].linkage, before[1])
     if others is not None:
         every = np.vstack([every, others.everything])
-    sheet = Sheet(axes, every.min(axis=0), every.max(axis=0), _MARGIN)
+    sheet = Lettering(axes, every.min(axis=0), every.max(axis=0), _MARGIN)
     loose = [getattr(joint, "clearance", None) or 0.0 for joint in mechanism.joints]
     gain = max(1.0, float(f"{_GAP / (max(loose) * sheet.per_m):.0e}")) if any(loose) else 0.0
     for points in others.bodies.values() if others is not None else ():
@@ -70,7 +70,7 @@ def draw(
 class _Drawing(NamedTuple):
     """What the parts of a drawing share."""
 
-    sheet: Sheet
+    sheet: Lettering
     scene: Scene
     placed: Placed
     changed: Mapping[str, list[str]] | None

@@ -15,7 +15,7 @@ _BAR = 2.0  # width from which on a line covers a word, points
 _LEADER = 12.0  # points between a word and its place from which on a line joins them
 
 
-class Sheet:
+class Lettering:
     """Axes of equal scales that know what is drawn on them; lengths on paper are in points, places in m."""
 
     def __init__(self, axes: "style.Axes", low: Array, high: Array, margin: float) -> None:
