@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, RunUp
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 
 
@@ -109,9 +110,9 @@ class Dense:
         return 0.0 if name == m.GROUND else q[self.first[name] + 2]
 
     def driven(self, drive, t):
-        if isinstance(drive, m.ConstantSpeed):
+        if isinstance(drive, ConstantSpeed):
             return self.mechanism.body(drive.body).start_angle + drive.speed * t
-        if isinstance(drive, m.RunUp):
+        if isinstance(drive, RunUp):
             start, speed = self.mechanism.body(drive.body).start_angle, self.curves[drive.name]
             if not isinstance(t, Jet):
                 return start + speed.antiderivative()(t)
@@ -137,7 +138,7 @@ class Dense:
             if isinstance(joint, m.Fixed):
                 rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
         for drive in self.mechanism.drives:
-            if drive.prescribed or isinstance(drive, m.RunUp):
+            if drive.prescribed or isinstance(drive, RunUp):
                 rows[drive.name, "drive"] = q[self.first[drive.body] + 2] - self.driven(drive, t)
         return rows
 
@@ -289,7 +290,7 @@ class Dense:
         Q = self.loads(q, v, t)
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
-            if not (drive.prescribed or isinstance(drive, m.RunUp)):
+            if not (drive.prescribed or isinstance(drive, RunUp)):
                 k = self.first[drive.body] + 2
                 torque = drive.torque * (self.curve if drive.table else 1.0)
                 if drive.by_speed is not None:
