@@ -8,7 +8,6 @@ from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import implicit_method
 from hpcclear.scene import load_scene
@@ -192,6 +191,7 @@ def test_numbers_of_a_film_may_be_varied():
         [[0.01, 1e-4, 0.02], [0.02, 1e-4, 0.02], [0.01, 2e-4, 0.02], [0.01, 1e-4, 0.04]]
     )
     points = Points(("mu", "C", "L"), values, tuple((path,) for path in paths))
-    p = Parameters(parameters(scene, points))
-    assert p.film_scale[:, 0] == pytest.approx(p.film_scale[0, 0] * np.array([1, 2, 1 / 8, 8]))
-    assert p.film_shear[:, 0] == pytest.approx(p.film_shear[0, 0] * np.array([1, 2, 0.5, 2]))
+    rows = parameters(scene, points)
+    force, shear = (rows[:, at.JOINT_BLOCKS + k] for k in (at.FILM_SCALE, at.FILM_SHEAR))
+    assert force == pytest.approx(force[0] * np.array([1, 2, 1 / 8, 8]))
+    assert shear == pytest.approx(shear[0] * np.array([1, 2, 0.5, 2]))

@@ -277,14 +277,14 @@ def test_a_stopped_run_ends_with_all_its_samples(tmp_path, kept, monkeypatch, ch
     output, folder = tmp_path / "stopped.nc", tmp_path / "kept"
     from hpcclear.ensemble.statistics import _Streaming
 
-    finish = _Streaming._run_samples
+    finish = _Streaming._simulate
 
     def stop(self: _Streaming, *samples: object) -> None:
         finish(self, *samples)
         raise Stopped("now")
 
     with monkeypatch.context() as patch:
-        patch.setattr(_Streaming, "_run_samples", stop)
+        patch.setattr(_Streaming, "_simulate", stop)
         with pytest.raises(Stopped):
             run_statistics(random_scene(), output, alone(), raw=folder, options=QUIET)
     assert not output.exists()
