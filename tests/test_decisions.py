@@ -138,9 +138,7 @@ def test_no_design_is_recommended_within_constraints_that_it_may_break(
 def test_a_design_that_surely_satisfies_them_is_recommended():
     text = {
         line.label: line.text
-        for line in answer(
-            {"verification": verified(Verdict.HOLDS, np.nan, [-0.1, -0.2, -0.3])}, "out"
-        )
+        for line in answer({"verification": verified(Verdict.HOLDS, np.nan, [-0.1, -0.2, -0.3])})
     }
     assert text["criterion"].startswith("lowest mean of f within the constraints of 3")
     assert text["constraint"].endswith(": satisfied")

@@ -157,7 +157,7 @@ def test_a_finite_film_is_for_one_length_over_diameter():
 
 def test_a_scene_tells_of_its_films():
     scene = oiled()
-    assert "short oil film of 0.01 Pa s in joint crank_rod" in scene.effects_on()
+    assert "short oil film of 10 mPa*s in joint crank_rod" in scene.effects_on()
     assert implicit_method(scene) == "stiff"
     assert not any(".film" in text for text in scene.warnings)
     for film, word in (

@@ -477,7 +477,7 @@ def test_the_command_prints_intervals_growth_and_advice(identified):
     place, printed, code, _ = identified
     content = opened.read(place, "identify")
     assert code == (0 if content["explained"].all() else 4)
-    for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment", "by frame_force_x"):  # fmt: skip
+    for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment"):  # fmt: skip
         assert words in " ".join(printed.split()), printed
     ends = content["interval"].values[:, 0]
     assert (ends[:, 0] < [42e-6, 60e-6]).all()

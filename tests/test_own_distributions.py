@@ -156,7 +156,7 @@ def test_check_prints_the_parameters(scene_file):
     done = _command("check", str(scene_file), "--no-cost", "--details", "--set", FALLING)
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())
-    assert "mylaws:Falling(start = 0.0004, width = 0.0003), 0.0004" in printed
+    assert "mylaws:Falling(start = 0.0004, width = 0.0003), 0.4 mm" in printed
 
 
 @pytest.mark.mpi

@@ -20,6 +20,7 @@ from hpcclear.report.figures import motion, moving
 from hpcclear.report.figures.drawing import CHANGED, draw
 from hpcclear.report.figures.placed import Placed
 from hpcclear.report.figures.sketch import changes
+from hpcclear.report.figures.style import colour
 from hpcclear.report.html.page import write_report
 from hpcclear.results.content import Results
 from hpcclear.scene import load_scene
@@ -221,8 +222,8 @@ def test_parts_that_differ_from_another_design_are_coloured_with_their_change(tm
     poses = [poses_at_start(one, DRAWN_AT) for one in (scene, other)]
     draw(axes, scene, poses[0], found, (other, poses[1]))
     words = {text.get_text(): text.get_color() for text in axes.texts}
-    assert words["rod\nmass 0.45 kg → 0.3 kg"] == CHANGED
-    assert words["slider"] != CHANGED
+    assert words["rod\nmass 0.45 kg → 0.3 kg"] == colour(CHANGED)
+    assert words["slider"] != colour(CHANGED)
     dashed = [
         line for line in axes.lines if line.get_linestyle() == "--" and len(line.get_xdata()) == 2
     ]
