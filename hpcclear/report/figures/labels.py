@@ -127,6 +127,15 @@ def value(one: Variable) -> str:
     return quantity(number, str(one.attrs["units"]))
 
 
+def alike(*ones: Variable) -> list[str]:
+    """A design variable of several designs as it is printed, in one unit."""
+    texts, units = [value(one) for one in ones], str(ones[0].attrs["units"])
+    if options(ones[0]) or len({text.split(" ")[-1] for text in texts if text != "–"}) < 2:
+        return texts
+    chosen = scale(units, [float(one) for one in ones])
+    return [f"{float(one) * chosen.factor:.4g} {chosen.unit}" for one in ones]
+
+
 def options(variable: Variable) -> list[str]:
     """Names of the rows of a table that a design variable chooses from; none of one that is a number."""
     return [one for one in str(variable.attrs.get("options", "")).split("; ") if one]

@@ -213,8 +213,8 @@ def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
         short = labels.words(one)
         words = re.split(", from | about ", str(one.attrs.get("long_name", "")))[0]
         label = short if words in ("", short) else words if "." in short else f"{short}, {words}"
-        before = () if base is None else (labels.value(base[name]),)
-        yield ScreenRow(label, (*before, labels.value(one)), spans.get(name))
+        both = (one,) if base is None else (base[name], one)
+        yield ScreenRow(label, tuple(labels.alike(*both)), spans.get(name))
 
 
 def _spans(best: Results, base: Results | None) -> dict[str, Span]:
