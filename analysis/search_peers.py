@@ -303,7 +303,7 @@ def main() -> None:
                 for row in rows
                 if row["method"] == name
             ]
-            more = sum(isinstance(their, str) or own < their for own, their in pairs)
+            more = sum(own < int(str(their).removeprefix("> ")) for own, their in pairs)
             print(
                 f"{name} needs more than the {part} of hpcclear for the same regret in {more} of {len(pairs)}"
             )
