@@ -114,7 +114,7 @@ class Screen:
         if self.header[1:2] == ("today",):
             tiles = ((t.label, t.before, t.value, t.change, t.within) for t in self.tiles)
             ends = (
-                f"{row.span.bound} bound" if row.span and row.span.bound else ""
+                f"at its {row.span.bound} bound" if row.span and row.span.bound else ""
                 for row in self.rows
             )
             design = zip(self.rows, ends, strict=True)

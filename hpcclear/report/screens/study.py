@@ -103,7 +103,7 @@ def _headline(of: Recommended, tiles: list[Tile], kept: bool) -> str:
     if kept:
         return "Keep today's design: no simulated design is better"
     said = [f"{lower(one.change)} {one.label}" for one in tiles[:2] if lower(one.change)]
-    return f"{name[0].upper()}{name[1:]}: {', '.join(said) or 'no significant change'}"
+    return f"Design {name}: {', '.join(said) or 'no significant change'}"
 
 
 def _doubt(of: Recommended) -> str:
@@ -272,11 +272,9 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
-        yield Trust(
-            Level.AMBER,
-            f"Chaotic motion in {int(moved.sum())} of {moved.size} designs: values are means",
-            "quality",
-        )
+        many = "all" if moved.all() else f"{int(moved.sum())} of {moved.size}"
+        text = f"Chaotic motion in {many} designs: values are means"
+        yield Trust(Level.AMBER, text, "quality")
     yield from _failures(of)
     errors = surrogate_errors(best)
     if any(abs(error) > FAR for error in errors):
