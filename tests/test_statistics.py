@@ -13,6 +13,7 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.ensemble import identity
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
@@ -166,7 +167,7 @@ def test_statistics_go_on_only_with_the_same_versions_and_processor(
     scene, output = scene_of(5000), tmp_path / "statistics.nc"
     run_statistics(scene, output, alone(), options=QUIET)
     changed = {**provenance.program(), name: value}
-    monkeypatch.setattr(provenance, "program", lambda: changed)
+    monkeypatch.setattr(identity, "program", lambda: changed)
     with pytest.raises(InputError, match="another run"):
         run_statistics(scene, output, alone(), options=QUIET)
 
