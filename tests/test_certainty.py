@@ -150,7 +150,7 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
 # -- which end is one -------------------------------------------------------------------------------
 
 
-def raced(monkeypatch, contest: int, origin: str = "search") -> list[int]:
+def raced(monkeypatch, contest: int, origin: str = "search", last: str = "") -> list[int]:
     """Simulations of three designs of deviations 0.1, 0.1005 and 0.2 after 512, where 0.5 % is asked for."""
     scene = load_scene(ROBUST).with_(
         {
@@ -161,6 +161,8 @@ def raced(monkeypatch, contest: int, origin: str = "search") -> list[int]:
     )  # fmt: skip
     run = SimpleNamespace(study=scene.required_study)
     choices = [Choice("", "one", {"m2": 0.2 + 0.01 * k}, origin=origin) for k in range(3)]
+    if last:
+        choices[2] = Choice(last, "one", {"m2": 0.22}, origin="given")
     rng = np.random.default_rng(6)
 
     def drawn(run, some, stage, purpose, count, first):
@@ -180,6 +182,21 @@ def test_who_contests_an_end_gets_more_simulations(monkeypatch):
     first, second, third = raced(monkeypatch, 64)
     assert (first, second, third) == (4096, 4096, 512)  # most_samples
     assert raced(monkeypatch, 64, "given") == [512, 512, 512]
+
+
+def test_the_baseline_gets_as_many_simulations_as_the_best(monkeypatch):
+    """It cannot be the best, but all changes are measured from it; other given designs stay as they are."""
+    assert raced(monkeypatch, 64, last="one original") == [4096, 4096, 4096]
+    assert raced(monkeypatch, 64, last="one printed") == [4096, 4096, 512]
+
+
+def test_a_design_of_which_little_is_known_is_not_called_as_good():
+    """The second is 3 % worse and lighter; its few simulations do not show that it is worse."""
+    values = np.array([[1.00, 2.0], [1.03, 1.0]])
+    shifts = np.zeros((2, 2, 16))
+    shifts[0, 1] = np.random.default_rng(8).normal(0.0, 0.2, 16)
+    assert Compared(values, shifts, 0.95).best(0) == 1
+    assert Compared(values, shifts, 0.95, np.array([0.01, 0.01])).best(0) == 0
 
 
 def outliers(rng, shape):

@@ -54,8 +54,8 @@ class Compared:
         return np.asarray(self.less.all(axis=0).any(axis=0))
 
     def best(self, objective: int) -> int:
-        """The design with the least of an objective; of those that are statistically indistinguishable from it, the best in
-        the others, one after the other in their order.
+        """The design with the least of an objective; of those that are statistically indistinguishable from it, and no more
+        than `near` above it, the best in the others, one after the other in their order.
 
         Raises
         ------
