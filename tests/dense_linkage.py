@@ -16,8 +16,10 @@ from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, RunUp
 from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.scene.driving import PlanarRunUp, PlanarSpeed
+from hpcclear.scene.joints import PlanarSlot
+from hpcclear.scene.planar import Pin, PlanarClearance, PlanarFixed, PlanarSlide
 
 
 class Jet:
@@ -110,9 +112,9 @@ class Dense:
         return 0.0 if name == m.GROUND else q[self.first[name] + 2]
 
     def driven(self, drive, t):
-        if isinstance(drive, ConstantSpeed):
+        if isinstance(drive, PlanarSpeed):
             return self.mechanism.body(drive.body).start_angle + drive.speed * t
-        if isinstance(drive, RunUp):
+        if isinstance(drive, PlanarRunUp):
             start, speed = self.mechanism.body(drive.body).start_angle, self.curves[drive.name]
             if not isinstance(t, Jet):
                 return start + speed.antiderivative()(t)
@@ -125,20 +127,20 @@ class Dense:
         """Rows by name: x and y of a pin; across and angle of a guide; the angle of a drive."""
         rows = {}
         for joint in self.mechanism.ideal:
-            (x, y), (bx, by) = (self.place(q, place) for place in joint.places)
-            if isinstance(joint, m.Revolute):
+            (x, y), (bx, by) = (self.place(q, place) for place in m.places_of(joint))
+            if isinstance(joint, Pin):
                 rows |= {(joint.name, "x"): x - bx, (joint.name, "y"): y - by}
                 continue
             tilt = self.angle(q, joint.line) + joint.angle
             dx, dy = turned((1.0, 0.0), tilt)
             rows[joint.name, "across"] = dx * (y - by) - dy * (x - bx)
-            if isinstance(joint, m.Slot):
+            if isinstance(joint, PlanarSlot):
                 continue
             rows[joint.name, "angle"] = self.angle(q, joint.point) - tilt
-            if isinstance(joint, m.Fixed):
+            if isinstance(joint, PlanarFixed):
                 rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
         for drive in self.mechanism.drives:
-            if drive.prescribed or isinstance(drive, RunUp):
+            if drive.prescribed or isinstance(drive, PlanarRunUp):
                 rows[drive.name, "drive"] = q[self.first[drive.body] + 2] - self.driven(drive, t)
         return rows
 
@@ -174,13 +176,15 @@ class Dense:
 
     def touches(self, joint, q):
         """Names of a joint's contacts, and where each touches (`Touch`)."""
-        if isinstance(joint, m.Clearance):
-            journal, bearing = (np.array(self.place(q, place), float) for place in joint.places)
+        if isinstance(joint, PlanarClearance):
+            journal, bearing = (
+                np.array(self.place(q, place), float) for place in m.places_of(joint)
+            )
             yield joint.name, touching(joint, journal - bearing, bearing)
             return
-        middle, on_line = (np.array(self.place(q, place), float) for place in joint.places)
+        middle, on_line = (np.array(self.place(q, place), float) for place in m.places_of(joint))
         line = self.angle(q, joint.line) + joint.angle
-        if isinstance(joint, m.LooseSlot):
+        if isinstance(joint, PlanarSlot):
             r, face = joint.pin_radius, joint.pin_radius + joint.clearance
             arms = {"left": (1, (0.0, 0.0)), "right": (-1, (0.0, 0.0))}
         else:
@@ -206,10 +210,10 @@ class Dense:
 
     def pressed(self, joint, name, touch, laws, q, v):
         gap, depth, n, t, where = touch
-        on_j, on_b = (self.point_on(q, m.split(place)[0], where) for place in joint.places)
+        on_j, on_b = (self.point_on(q, m.split(place)[0], where) for place in m.places_of(joint))
         rate = n @ (on_j - on_b) @ v
         sliding = t @ (on_j - on_b) @ v
-        elastic = laws.active * joint.stiffness * depth**1.5
+        elastic = laws.active * stiffness(joint) * depth**1.5
         normal = max(elastic * laws.factor(rate), 0.0)
         tangential = normal * laws.friction(sliding)
         force = normal * n + tangential * t  # on the bearing
@@ -281,7 +285,7 @@ class Dense:
             drive = self.mechanism.drive_of(body.name)
             k = self.first[body.name]
             found[k : k + 2] = body.mass
-            found[k + 2] = (body.inertia or 0.7) + getattr(drive, "inertia", 0.0)
+            found[k + 2] = (body.inertia or 0.7) + getattr(drive, "flywheel_inertia", 0.0)
         return found
 
     def accelerations(self, q, v, t=0.0):
@@ -290,11 +294,11 @@ class Dense:
         Q = self.loads(q, v, t)
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
-            if not (drive.prescribed or isinstance(drive, RunUp)):
+            if not (drive.prescribed or isinstance(drive, PlanarRunUp)):
                 k = self.first[drive.body] + 2
-                torque = drive.torque * (self.curve if drive.table else 1.0)
-                if drive.by_speed is not None:
-                    torque = np.interp(v[k], *np.transpose(drive.by_speed))
+                torque = self.curve if drive.table or drive.torque is None else drive.torque
+                if drive.torque_by_speed is not None:
+                    torque = np.interp(v[k], *np.transpose(drive.torque_by_speed))
                 self.seen.setdefault("torques", {})[drive.name] = torque
                 Q[k] += torque
         for joint, laws in zip(self.mechanism.clearances, self.contacts, strict=True):
@@ -304,8 +308,8 @@ class Dense:
         right = -turning - 2 * self.alpha * dc - self.beta**2 * c
         names = list(self.constraints(q, t))
         rubbed = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
-        guides = [j for j in rubbed if isinstance(j, m.Slide)]
-        pins = [j for j in rubbed if not isinstance(j, m.Slide)]
+        guides = [j for j in rubbed if isinstance(j, PlanarSlide)]
+        pins = [j for j in rubbed if not isinstance(j, PlanarSlide)]
         for signs in itertools.product((1.0, -1.0), repeat=len(guides)):
             K = np.block([[M, -J.T], [J, np.zeros((len(c), len(c)))]])
             loss, ok = 0.0, True
@@ -314,7 +318,7 @@ class Dense:
                 tilt = self.angle(q, joint.line) + joint.angle
                 d = np.array(turned((1.0, 0.0), tilt))
                 where = np.array(self.place(q, joint.point), float)
-                on, under = (self.point_on(q, m.split(p)[0], where) for p in joint.places)
+                on, under = (self.point_on(q, m.split(p)[0], where) for p in m.places_of(joint))
                 influence = d @ (on - under)
                 speed = influence @ v
                 x = speed / joint.friction.ramp_speed
@@ -339,7 +343,7 @@ class Dense:
             given, loss = np.concatenate([Q, right]), 0.0
             for joint, size in zip(pins, sizes, strict=True):
                 signs = np.zeros(self.n)
-                for place, sign in zip(joint.places, (1.0, -1.0), strict=True):
+                for place, sign in zip(m.places_of(joint), (1.0, -1.0), strict=True):
                     if m.split(place)[0] != m.GROUND:
                         signs[self.first[m.split(place)[0]] + 2] = sign
                 rubs, turning = joint.friction, signs @ v
@@ -360,18 +364,32 @@ class Dense:
         raise AssertionError("reactions and friction of pins do not settle")
 
 
+def stiffness(joint):
+    """K of Hertz of a joint's contacts, N/m^1.5: of its materials, 2e9 where none are given."""
+    materials = getattr(joint, "materials", None)
+    if materials is None:
+        return 2e9
+    both = (materials.bearing, materials.journal)
+    compliance = sum((1 - one.poisson_ratio**2) / one.youngs_modulus for one in both)
+    if isinstance(joint, PlanarClearance):
+        radius = joint.bearing_radius * (joint.bearing_radius - joint.clearance) / joint.clearance
+    else:
+        radius = getattr(joint, "corner_radius", None) or joint.pin_radius
+    return 4 / (3 * compliance) * math.sqrt(radius)
+
+
 def loose(dense, joint):
     """Functions of the coordinates: how far a slider is off its line, and its tilt."""
 
     def offset(q):
-        (x, y), (bx, by) = (dense.place(q, place) for place in joint.places)
+        (x, y), (bx, by) = (dense.place(q, place) for place in m.places_of(joint))
         dx, dy = turned((1.0, 0.0), dense.angle(q, joint.line) + joint.angle)
         return dx * (y - by) - dy * (x - bx)
 
     def tilt(q):
         return dense.angle(q, joint.point) - dense.angle(q, joint.line) - joint.angle
 
-    return (offset,) if isinstance(joint, m.LooseSlot) else (offset, tilt)
+    return (offset,) if isinstance(joint, PlanarSlot) else (offset, tilt)
 
 
 def assembled(dense, guess, t, eccentricities):
@@ -384,9 +402,9 @@ def assembled(dense, guess, t, eccentricities):
         rows, jacobians = [c], [J]
         for joint, e in zip(clear, eccentricities, strict=True):
             (a, _, Ja), (b, _, Jb) = (
-                dense.motion_of(q, np.zeros(dense.n), place) for place in joint.places
+                dense.motion_of(q, np.zeros(dense.n), place) for place in m.places_of(joint)
             )
-            if isinstance(joint, m.Clearance):
+            if isinstance(joint, PlanarClearance):
                 rows.append(a - b - e)
                 jacobians.append(Ja - Jb)
                 continue

@@ -3,21 +3,37 @@
 import math
 from dataclasses import replace
 
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import (
-    Body,
-    Clearance,
-    Fixed,
-    IdealFriction,
-    LooseSlide,
-    LooseSlot,
-    Revolute,
-    Slide,
-    Slot,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import Body, corners_of, split
+from hpcclear.scene.driving import PlanarHarmonic, PlanarSpeed, PlanarTorque
+from hpcclear.scene.joints import IdealPinFriction, JointFriction, PlanarSlot
 from hpcclear.scene.loads import KINDS
+from hpcclear.scene.planar import PlanarClearance, PlanarFixed, PlanarRevolute, PlanarSlide
+
+
+def rows(table, kind, names):
+    """What makes rows of a scene's table, entries by position or name, unchecked."""
+
+    def made(*entries, **more):
+        given = dict(zip(names.split(), entries, strict=False))
+        return table.model_construct(kind=kind, **given, **more)
+
+    return made
+
+
+constant_speed = rows(PlanarSpeed, "constant-speed", "name body speed period")
+harmonic = rows(PlanarHarmonic, "harmonic", "name body amplitude frequency mean phase period")
+torque_drive = rows(PlanarTorque, "torque", "name body torque initial_speed")
+revolute = rows(PlanarRevolute, "revolute", "name journal bearing")
+loose_pin = rows(PlanarClearance, "clearance", "name journal bearing clearance bearing_radius")
+slide = rows(PlanarSlide, "slide", "name point line angle friction")
+slot = rows(PlanarSlot, "slot", "name point line angle clearance pin_radius")
+fixed = rows(PlanarFixed, "fixed", "name point line angle")
+
+
+def changed(row, **entries):
+    """A row of a scene's table with other entries."""
+    return row.model_copy(update=entries)
 
 
 def load(kind, name, **entries):
@@ -25,8 +41,8 @@ def load(kind, name, **entries):
     return KINDS[kind](kind=kind, name=name, **entries)
 
 
-MOTOR = ConstantSpeed("motor", "crank", 40.0)
-ENGINE = TorqueDrive("engine", "crank", torque=3.0, initial_speed=40.0, inertia=2e-3)
+MOTOR = constant_speed("motor", "crank", 40.0)
+ENGINE = torque_drive("engine", "crank", 3.0, 40.0, flywheel_inertia=2e-3)
 
 
 def bar(name, length, mass, start=0.0, *, off=0.0, **points):
@@ -38,8 +54,8 @@ def bar(name, length, mass, start=0.0, *, off=0.0, **points):
 def pin(name, journal, bearing, *, open_pins=()):
     """A pin, with clearance if it is named among the open ones."""
     if name in open_pins:
-        return Clearance(name, journal, bearing, 2e-4, 0.01, 2e9)
-    return Revolute(name, journal, bearing)
+        return loose_pin(name, journal, bearing, 2e-4, 0.01)
+    return revolute(name, journal, bearing)
 
 
 def pins(open_pins, *rows):
@@ -57,7 +73,7 @@ def slider_crank(*open_pins, drive=MOTOR, tilt=0.0, offset=0.0, friction=None, o
     return Mechanism(
         bodies,
         (
-            Slide("guide", "slider.pin", "ground.line", tilt, friction),
+            slide("guide", "slider.pin", "ground.line", tilt, friction),
             *pins(
                 open_pins,
                 ("o14", "crank.a", "ground.o"),
@@ -100,7 +116,7 @@ def v_twin(*open_pins, drive=MOTOR, friction=None):
             Body(f"piston_{side}", 0.4, points={"pin": (0.0, 0.0)}, start_angle=tilt),
         ]
         joints += [
-            Slide(f"bore_{side}", f"piston_{side}.pin", "ground.o", tilt, friction),
+            slide(f"bore_{side}", f"piston_{side}.pin", "ground.o", tilt, friction),
             pin(f"big_{side}", "crank.b", f"rod_{side}.a", open_pins=open_pins),
             pin(f"small_{side}", f"piston_{side}.pin", f"rod_{side}.b", open_pins=open_pins),
         ]
@@ -119,7 +135,7 @@ def six_bar(*open_pins, friction=None):
     )
     joints = (
         *base.joints,
-        Slide("bed", "ram.pin", "ground.bed", math.pi / 2, friction),
+        slide("bed", "ram.pin", "ground.bed", math.pi / 2, friction),
         *pins(open_pins, ("o5", "rocker.b", "link.a"), ("o6", "ram.pin", "link.b")),
     )
     loads = (load("force", "work", place="ram.pin", force=[0.0, -200.0]),)
@@ -140,7 +156,7 @@ def quick_return(*open_pins, friction=None):
             ("o2", "crank.b", "block.pin"),
             ("o3", "lever.a", "ground.p"),
         ),
-        Slide("slot", "block.pin", "lever.a", 0.0, friction),
+        slide("slot", "block.pin", "lever.a", 0.0, friction),
     )
     loads = (
         load(
@@ -162,8 +178,8 @@ def slotted_lever(*open_pins, clearance=None):
     bodies = tuple(body for body in base.bodies if body.name != "block")
     joints = [joint for joint in base.joints if joint.name in ("o1", "o3")]
     places = ("slot", "crank.b", "lever.a", 0.1)
-    slot = Slot(*places) if clearance is None else LooseSlot(*places, clearance, 0.006, 2e9)
-    return Mechanism(bodies, (*joints, slot), base.drives, base.ground, base.loads)
+    made = slot(*places) if clearance is None else slot(*places, clearance, 0.006)
+    return Mechanism(bodies, (*joints, made), base.drives, base.ground, base.loads)
 
 
 def three_rrr(*open_pins):
@@ -190,7 +206,7 @@ def three_rrr(*open_pins):
             (f"tip{k}", f"leg{k}.b", f"platform.p{k}"),
         )
         drives.append(
-            Harmonic(f"servo{k}", f"arm{k}", 0.2, 2.0 * (1 + k % 2), angle + 2.2, 0.4 * k, k == 0)
+            harmonic(f"servo{k}", f"arm{k}", 0.2, 2.0 * (1 + k % 2), angle + 2.2, 0.4 * k, k == 0)
         )
     return Mechanism(tuple(bodies), tuple(joints), tuple(drives), ground)
 
@@ -228,7 +244,7 @@ def two_stage(*open_pins):
     )
     joints = (
         *base.joints,
-        Slide("feed", "tool.grip", "slider.top", 0.9),
+        slide("feed", "tool.grip", "slider.top", 0.9),
         *pins(open_pins, ("o5", "tool.grip", "strut.b"), ("o6", "strut.a", "ground.r")),
     )
     return Mechanism(bodies, joints, base.drives, {**base.ground, "r": (0.22, -0.05)}, base.loads)
@@ -248,7 +264,7 @@ def turning_slide(*open_pins, friction=None):
             ("o2", "block.pin", "link.b"),
             ("o3", "link.a", "ground.p"),
         ),
-        Slide("arm", "block.pin", "crank.c", 0.25, friction),
+        slide("arm", "block.pin", "crank.c", 0.25, friction),
     )
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.06, 0.01)})
 
@@ -257,20 +273,17 @@ def held_frame(*open_pins):
     """A four-bar whose base plate is a body held on the ground, askew."""
     base = four_bar(*open_pins)
     plate = Body("plate", 5.0, points={"o": (0.0, 0.0), "p": (0.13, 0.01)})
-    joints = tuple(
-        type(j)(**{**j.__dict__, "bearing": j.bearing.replace("ground.", "plate.")})
-        for j in base.joints
-    )
+    joints = tuple(changed(j, bearing=j.bearing.replace("ground.", "plate.")) for j in base.joints)
     return Mechanism(
-        (*base.bodies, plate), (*joints, Fixed("bolts", "plate.o", "ground.o", 0.2)), base.drives
+        (*base.bodies, plate), (*joints, fixed("bolts", "plate.o", "ground.o", 0.2)), base.drives
     )
 
 
 def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
     """A mechanism whose named guides have clearance; what they guide then turns, and needs an inertia."""
     loose = {
-        j.name: LooseSlide(
-            j.name, j.point, j.line, j.angle, None, 2e-4, length, height, radius, 2e9
+        j.name: changed(
+            j, friction=None, clearance=2e-4, length=length, height=height, corner_radius=radius
         )
         for j in mechanism.joints
         if j.name in names
@@ -281,7 +294,7 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
         for joint in loose.values():
             own, point = split(joint.point)
             if own == body.name:
-                points |= joint.corners(points[point])
+                points |= corners_of(joint, points[point])
         guided = len(points) > len(body.points)
         inertia = 3e-5 if guided and not body.inertia else body.inertia
         bodies.append(replace(body, points=points, inertia=inertia))
@@ -292,16 +305,23 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
 def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
     """A mechanism with friction in its named pins, all without clearance by default."""
     joints = tuple(
-        replace(j, friction=IdealFriction(coefficient, 0.3, radius * (1.0 + 0.2 * k)))
-        if type(j) is Revolute and (not names or j.name in names)
+        changed(
+            j,
+            friction=IdealPinFriction(
+                coefficient=coefficient, ramp_speed=0.3, radius=radius * (1.0 + 0.2 * k)
+            ),
+        )
+        if isinstance(j, PlanarRevolute) and (not names or j.name in names)
         else j
         for k, j in enumerate(mechanism.joints)
     )
     return replace(mechanism, joints=joints)
 
 
-RUB = IdealFriction(0.15, 0.1)
-BLOWER = replace(ENGINE, by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5)))
+RUB = JointFriction(coefficient=0.15, ramp_speed=0.1)
+BLOWER = changed(
+    ENGINE, torque=None, torque_by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5))
+)
 HELD = (
     load(
         "torsion-spring",

@@ -5,7 +5,7 @@ import types
 from functools import partial
 
 import numpy as np
-from dense_linkage import Contact, Jet, admissible, assembled, turned
+from dense_linkage import Contact, Jet, admissible, assembled, stiffness, turned
 from some_laws import effects_with
 from some_laws import row as row_of_law
 
@@ -15,8 +15,9 @@ from hpcclear.dynamics.contacts import guide, pin_in_bearing
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import GROUND, Slide, split
+from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.physics import angles, friction
+from hpcclear.scene.planar import PlanarSlide
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
@@ -83,7 +84,7 @@ class Lane:
     def __init__(self, mechanism, on=EVERYTHING, *, feedback=(ALPHA, BETA), **options):
         self.mechanism = mechanism
         tabled = (*mechanism.drives, *mechanism.loads)
-        curves = {one.name: 401 for one in tabled if getattr(one, "table", False)}
+        curves = {one.name: 401 for one in tabled if one.table}
         rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, free=100, curves=curves)
         self.text = generate(mechanism, on, rows, **options)
         names = {
@@ -108,7 +109,7 @@ class Lane:
             block = self.par[first : first + at.JOINT_ROWS]
             shape = contact.geometry.shape(partial(getattr, joint))
             block[at.CLEARANCE] = shape.clearance
-            block[row_of_law("contact", "hunt-crossley", "stiffness")] = joint.stiffness
+            block[row_of_law("contact", "hunt-crossley", "stiffness")] = stiffness(joint)
             block[row_of_law("contact", "hunt-crossley", "damping")] = CHI
             block[at.BEARING_RADIUS] = shape.bearing_radius
             block[at.JOURNAL_RADIUS] = shape.journal_radius
@@ -147,7 +148,7 @@ def guess_of(mechanism):
 
     for _ in bodies:
         for joint in mechanism.joints:
-            for own, other in (joint.places, joint.places[::-1]):
+            for own, other in (places_of(joint), places_of(joint)[::-1]):
                 body, point = split(own)
                 if body not in where and split(other)[0] in where:
                     put(body, point, place(other))
@@ -164,7 +165,7 @@ def random_states(dense, rng, count):
             joint.clearance
             * rng.uniform(0.7, 1.3)
             * np.array([math.cos(a), math.sin(a)])
-            / (1.0, 0.5 * getattr(joint, "length", 2.0))
+            / (1.0, 0.5 * (getattr(joint, "length", None) or 2.0))
             for joint, a in zip(mechanism.clearances, rng.uniform(0, 6, 9), strict=False)
         ]
         q = assembled(
@@ -182,8 +183,8 @@ def sliding(dense, q, v, a):
     jets = [Jet(*parts) for parts in zip(q, v, a, strict=True)]
     found = {}
     for joint in dense.mechanism.ideal:
-        if isinstance(joint, Slide):
-            (x, y), (bx, by) = (dense.place(jets, p) for p in joint.places)
+        if isinstance(joint, PlanarSlide):
+            (x, y), (bx, by) = (dense.place(jets, p) for p in places_of(joint))
             dx, dy = turned((1.0, 0.0), dense.angle(jets, joint.line) + joint.angle)
             s = dx * (x - bx) + dy * (y - by)
             found[joint.name] = s.parts

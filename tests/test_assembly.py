@@ -11,10 +11,13 @@ from linkages import (
     MOTOR,
     RUB,
     bar,
+    changed,
+    constant_speed,
     four_bar,
     pins,
     quick_return,
     six_bar,
+    slide,
     slider_crank,
     three_rrr,
     v_twin,
@@ -22,10 +25,12 @@ from linkages import (
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Body, Fixed, Slide, split
+from hpcclear.dynamics.linkage.parts import Body, split
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
+from hpcclear.scene.driving import PlanarSpeed
+from hpcclear.scene.fields import Position
+from hpcclear.scene.planar import PlanarFixed
 
 PRESCRIBED = {
     "slider-crank": slider_crank(tilt=0.3, offset=0.01, friction=RUB, off=0.003),
@@ -50,7 +55,7 @@ def where_held(dense):
     """Coordinates (n,) of the bodies held on the ground, 0 for all others."""
     q = np.zeros(dense.n)
     for joint in dense.mechanism.ideal:
-        if isinstance(joint, Fixed):
+        if isinstance(joint, PlanarFixed):
             body = dense.mechanism.body(split(joint.point)[0])
             arm = turned(np.subtract(body.center, body.points[split(joint.point)[1]]), joint.angle)
             place = dense.first[body.name]
@@ -69,7 +74,7 @@ def test_every_linkage_is_assembled_as_it_was_meant(name):
     assert np.abs(dc).max(initial=0.0) < 1e-10
     assert all(gap < 1e-12 for gap in open_gaps(assembly).values())
     for body in mechanism.bodies:
-        if isinstance(mechanism.drive_of(body.name), ConstantSpeed):
+        if isinstance(mechanism.drive_of(body.name), PlanarSpeed):
             assert assembly.angle(body.name) == pytest.approx(body.start_angle)
     assert len(assembly.report()) == len(mechanism.bodies)
 
@@ -88,7 +93,9 @@ def open_gaps(assembly):
 def test_journals_start_where_they_are_put():
     mechanism = slider_crank("o12", "o23")
     joints = tuple(
-        replace(joint, start_eccentricity=(1e-4, -5e-5)) if joint.name == "o12" else joint
+        changed(joint, start_eccentricity=Position(x=1e-4, y=-5e-5))
+        if joint.name == "o12"
+        else joint
         for joint in mechanism.joints
     )
     gaps = open_gaps(assemble(replace(mechanism, joints=joints)))
@@ -154,8 +161,8 @@ def on_two_rails():
         ),
         (
             *pins((), ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "rod.a")),
-            Slide("rail", "carriage.a", "ground.o"),
-            Slide("second", "carriage.b", "ground.high"),
+            slide("rail", "carriage.a", "ground.o"),
+            slide("second", "carriage.b", "ground.high"),
             *pins(("o3",), ("o3", "carriage.pin", "rod.b"), ("o4", "tail.a", "rod.b")),
         ),
         (MOTOR,),
@@ -216,7 +223,7 @@ def test_what_is_left_free_has_no_prescribed_motion():
 def test_a_second_drive_of_constant_speed_may_turn_twice_as_fast():
     base = three_rrr()
     drives = tuple(
-        ConstantSpeed(f"servo{k}", f"arm{k}", 0.2 * (1 + k % 2), period=k == 0) for k in range(3)
+        constant_speed(f"servo{k}", f"arm{k}", 0.2 * (1 + k % 2), period=k == 0) for k in range(3)
     )
     motion = prescribed_motion(replace(base, drives=drives), np.linspace(0, 0.3, 7))
     forest = motion.assembly.loops.forest

@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 import running
 from bending_by_lagrange import IdealSliderCrank, Rod
+from linkages import constant_speed, loose_pin, revolute, slide, torque_drive
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, TorqueDrive
 from hpcclear.dynamics.linkage.elements import held_inverse, sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import Bending, Body, Clearance, Revolute, Slide
+from hpcclear.dynamics.linkage.parts import Body
 from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method
+from hpcclear.scene.planar import BarBending
 from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain
 
@@ -39,24 +40,24 @@ def mechanism(opened=(), modes=2, stiffness=SIMEON, damping=0.02, torque=False, 
     ends = {"a": (0.0, 0.0), "b": (LENGTH, 0.0)}
     rod = Body(
         "rod", bar["mass"], bar["inertia"], (bar["center"], 0.0), ends,
-        bending=Bending(modes, stiffness, damping) if modes else None,
+        bending=BarBending(modes=modes, stiffness=stiffness, damping=damping) if modes else None,
     )  # fmt: skip
     crank = Body("crank", 0.36, 2.7e-3, (0.07, 0.0), {"a": (0.0, 0.0), "b": (CRANK, 0.0)})
     slider = Body("slider", SLIDER, points={"pin": (0.0, 0.0)})
 
     def pin(name, journal, bearing):
         if name in opened:
-            return Clearance(name, journal, bearing, 1e-4, 1e-2, 1e9)
-        return Revolute(name, journal, bearing)
+            return loose_pin(name, journal, bearing, 1e-4, 1e-2)
+        return revolute(name, journal, bearing)
 
-    drive = ConstantSpeed("drive", "crank", SPEED)
+    drive = constant_speed("drive", "crank", SPEED)
     if torque:
-        drive = TorqueDrive("drive", "crank", 3.0, SPEED)
+        drive = torque_drive("drive", "crank", 3.0, SPEED)
     return Mechanism(
         (crank, rod, slider),
         (
-            Revolute("crank_frame", "crank.a", "ground.o"),
-            Slide("guide", "slider.pin", "ground.o"),
+            revolute("crank_frame", "crank.a", "ground.o"),
+            slide("guide", "slider.pin", "ground.o"),
             pin("crank_rod", "crank.b", "rod.a"),
             pin("rod_slider", "slider.pin", "rod.b"),
         ),

@@ -10,7 +10,7 @@ import report_data as data
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.planar.curves import curve_at
+from hpcclear.base.pieces import periodic
 from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
@@ -53,7 +53,9 @@ def test_a_pressure_is_a_force_on_the_piston(tmp_path):
     area, pressure = math.pi / 4 * 0.042**2, 1e5 * kinds_of_tables.compressed(np.degrees(angles))
 
     def at(row, angles=angles):
-        return curve_at(with_file(base, "effects.slider_load", row).effects.slider_load, angles)
+        return periodic(
+            with_file(base, "effects.slider_load", row).effects.slider_load, 2 * math.pi
+        ).at(angles)
 
     force = -area * (pressure - 1e5)
     np.testing.assert_allclose(at(row), force, atol=2e-4 * np.ptp(force))
@@ -78,7 +80,7 @@ def test_no_kink_at_the_seam(tmp_path):
         load = with_file(
             base, "effects.slider_load", {**row, "file": str(path)}
         ).effects.slider_load
-        slopes.append(np.diff(curve_at(load, near)) / np.diff(near))
+        slopes.append(np.diff(periodic(load, 2 * math.pi).at(near)) / np.diff(near))
     for slope in slopes:
         assert np.abs(np.diff(slope)).max() < 0.01 * np.abs(slope).max()
         np.testing.assert_allclose(slope, slopes[0], rtol=5e-3)
@@ -116,7 +118,9 @@ def test_two_turns_of_a_four_stroke_engine(tmp_path):
     )
     angles = np.radians(degrees[::7])
     expected = math.pi / 4 * 0.08**2 * 1e5 * (kinds_of_tables.indicated(degrees[::7]) - 1.0)
-    np.testing.assert_allclose(curve_at(size, angles, 2), expected, atol=2e-3 * np.ptp(expected))
+    np.testing.assert_allclose(
+        periodic(size, 4 * math.pi).at(angles), expected, atol=2e-3 * np.ptp(expected)
+    )
     # a compressor's turn in a scene of two is repeated
     one = pressure_file(tmp_path, np.arange(0.0, 360.0), kinds_of_tables.compressed, "one.csv")
     twice = next(
@@ -126,8 +130,8 @@ def test_two_turns_of_a_four_stroke_engine(tmp_path):
     )
     assert len(twice) == 720
     np.testing.assert_allclose(
-        curve_at(twice, angles, 2),
-        curve_at(twice, angles + 2 * math.pi, 2),
+        periodic(twice, 4 * math.pi).at(angles),
+        periodic(twice, 4 * math.pi).at(angles + 2 * math.pi),
         atol=1e-9 * np.ptp(expected),
     )
     wrong = {**row, "pushes": "-x"}

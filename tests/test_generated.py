@@ -5,19 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_linkage import Dense
+from dense_linkage import Dense, stiffness
 from doc_pages import ROOT, blocks
-from linkages import LINKAGES, four_bar, load
+from linkages import LINKAGES, constant_speed, four_bar, load
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.drives import ConstantSpeed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 
-FAST = ConstantSpeed("motor", "crank", 200.0)
+FAST = constant_speed("motor", "crank", 200.0)
 IN_PLACE = ("slider-crank, two", "v-twin, ideal, torque", "quick-return")
 
 
@@ -133,9 +132,9 @@ def energy(dense, q, v):
     """Kinetic, potential and elastic energy of a state."""
     total = 0.5 * dense.masses() @ v**2 + GRAVITY * dense.masses()[1::3] @ q[1::3]
     for joint in dense.mechanism.clearances:
-        a, b = (np.array(dense.place(q, place), float) for place in joint.places)
+        a, b = (np.array(dense.place(q, place), float) for place in (joint.journal, joint.bearing))
         depth = max(np.linalg.norm(a - b) - joint.clearance, 0.0)
-        total += 0.4 * joint.stiffness * depth**2.5
+        total += 0.4 * stiffness(joint) * depth**2.5
     return total
 
 

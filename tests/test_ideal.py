@@ -1,5 +1,7 @@
 """The mechanism without clearance at a given speed: textbook relations, dense inverse dynamics, works."""
 
+import math
+
 import numpy as np
 import pytest
 from dense_mechanism import THETA2, X2, X3, Y2, admissible, assembled
@@ -13,7 +15,6 @@ from hpcclear.base.pieces import periodic
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
-from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.setup.parameters import parameters
@@ -152,12 +153,12 @@ def test_straight_lines_between_rows():
     """Exact everywhere, corners included."""
     angle = np.linspace(-1.0, 7.0, 20_001)
     expected = np.interp(angle, *np.array(ROWS).T, period=at.TURN)
-    found = curve_at(ROWS, angle, interpolation="linear")
+    found = periodic(ROWS, 2 * math.pi, "linear").at(angle)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
     even = tuple((k * at.TURN / 8, float(k % 3)) for k in range(8))
     expected = np.interp(angle, *np.array(even).T, period=at.TURN)
-    assert np.abs(curve_at(even, angle, interpolation="linear") - expected).max() < 1e-12
-    assert np.abs(curve_at(even, angle) - expected).max() > 0.01
+    assert np.abs(periodic(even, 2 * math.pi, "linear").at(angle) - expected).max() < 1e-12
+    assert np.abs(periodic(even, 2 * math.pi).at(angle) - expected).max() > 0.01
 
 
 @pytest.mark.parametrize("ideal_joints", [True, False])

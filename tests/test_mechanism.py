@@ -3,13 +3,28 @@
 from dataclasses import replace
 
 import pytest
-from linkages import LINKAGES, MOTOR, bar, four_bar, load, pins, slider_crank
+from linkages import (
+    LINKAGES,
+    MOTOR,
+    bar,
+    changed,
+    constant_speed,
+    fixed,
+    four_bar,
+    harmonic,
+    load,
+    loose_pin,
+    pins,
+    revolute,
+    slide,
+    slider_crank,
+)  # fmt: skip
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import Body, Clearance, Fixed, Revolute, Slide
+from hpcclear.dynamics.linkage.parts import Body
 from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.scene.planar import Pin, PlanarSlide
 
 BASE = four_bar("o2", "o3")
 
@@ -23,7 +38,7 @@ def with_body(name, **changes):
 def with_joint(name, **changes):
     """The four-bar with a changed joint."""
     joints = tuple(
-        replace(joint, **changes) if joint.name == name else joint for joint in BASE.joints
+        changed(joint, **changes) if joint.name == name else joint for joint in BASE.joints
     )
     return lambda: replace(BASE, joints=joints)
 
@@ -35,7 +50,7 @@ def with_more(table, *more):
 
 LONE = Body("lone", 0.1, 1e-5, points={"a": (0.0, 0.0)})
 SECOND = replace(LONE, name="second")
-DEAD = Harmonic("swing", "rocker", 0.2, 9.0)
+DEAD = harmonic("swing", "rocker", 0.2, 9.0)
 
 BROKEN = {
     "a joint to no body": (with_joint("o2", bearing="cupler.a"), "joints.o2.bearing", "no body"),
@@ -47,7 +62,7 @@ BROKEN = {
         lambda: replace(
             BASE,
             bodies=(*BASE.bodies, LONE, SECOND),
-            joints=(*BASE.joints, Revolute("o9", "lone.a", "second.a")),
+            joints=(*BASE.joints, revolute("o9", "lone.a", "second.a")),
         ),
         "bodies.lone",
         "second",
@@ -58,24 +73,24 @@ BROKEN = {
     "no body": (lambda: replace(BASE, bodies=()), "bodies", "no body"),
     "no drive": (lambda: replace(BASE, drives=()), "drives", "nothing drives"),
     "a drive of no body": (
-        lambda: replace(BASE, drives=(replace(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
+        lambda: replace(BASE, drives=(changed(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
     ),
     "a drive of the ground": (
-        lambda: replace(BASE, drives=(replace(MOTOR, body="ground"),)),
+        lambda: replace(BASE, drives=(changed(MOTOR, body="ground"),)),
         "drives.motor.body",
         "no such",
     ),
     "a drive of a guided body": (
-        lambda: replace(slider_crank("o12"), drives=(replace(MOTOR, body="slider"),)),
+        lambda: replace(slider_crank("o12"), drives=(changed(MOTOR, body="slider"),)),
         "drives.motor.body",
         "prismatic joint",
     ),
     "two drives of one body": (
-        with_more("drives", Harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
+        with_more("drives", harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
     ),
     "two that give the period": (
         lambda: replace(
-            BASE, drives=(replace(MOTOR, period=True), replace(DEAD, period=True))
+            BASE, drives=(changed(MOTOR, period=True), changed(DEAD, period=True))
         ),
         "drives.swing.period",
         "already",
@@ -114,17 +129,17 @@ BROKEN = {
         "too many degrees of freedom",
     ),
     "too many drives": (
-        lambda: replace(four_bar(), drives=(MOTOR, ConstantSpeed("other", "rocker", 40.0))),
+        lambda: replace(four_bar(), drives=(MOTOR, constant_speed("other", "rocker", 40.0))),
         "joints.o4",
         "remove a drive",
     ),
     "held on a body": (
-        with_more("joints", Fixed("weld", "rocker.b", "coupler.b")),
+        with_more("joints", fixed("weld", "rocker.b", "coupler.b")),
         "joints.weld.line",
         "to the ground only",
     ),
     "a ground that slides": (
-        with_more("joints", Slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
+        with_more("joints", slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
     ),
     "a load nowhere": (
         with_more("loads", load("force", "gas", place="piston.pin", force=[1.0, 0.0])), "loads.gas.place", "no body",
@@ -137,11 +152,11 @@ BROKEN = {
         lambda: Mechanism(
             tuple(bar(f"bar{k}", 0.1, 0.1) for k in range(9)),
             (
-                Revolute("o", "bar0.a", "ground.o"),
-                *(Clearance(f"o{k}", f"bar{k}.a", "bar0.b", 1e-4, 1e-2, 1e9) for k in range(1, 9)),
-                Clearance("o9", "bar8.b", "ground.o", 1e-4, 1e-2, 1e9),
+                revolute("o", "bar0.a", "ground.o"),
+                *(loose_pin(f"o{k}", f"bar{k}.a", "bar0.b", 1e-4, 1e-2) for k in range(1, 9)),
+                loose_pin("o9", "bar8.b", "ground.o", 1e-4, 1e-2),
             ),
-            (ConstantSpeed("motor", "bar0", 1.0),),
+            (constant_speed("motor", "bar0", 1.0),),
         ),
         "joints",
         "more than 8",
@@ -164,6 +179,6 @@ def test_coordinates_less_closures_are_the_degrees_of_freedom(name):
     mechanism = LINKAGES[name]
     for cartesian in (False, True):
         trees = forest(mechanism, cartesian)
-        rows = sum(2 if isinstance(one, (Revolute, Slide)) else 1 for one in trees.closures)
+        rows = sum(2 if isinstance(one, (Pin, PlanarSlide)) else 1 for one in trees.closures)
         assert len(trees.coordinates) - rows == freedom(mechanism)
         assert len(set(trees.coordinates)) == len(trees.coordinates)

@@ -12,11 +12,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import kind_of
-from hpcclear.base.pieces import breaks, level, mean_of, periodic
+from hpcclear.base.pieces import breaks, level, mean_of, periodic, spline
 from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
 from hpcclear.dynamics.linkage.elements import enter_table, look_up
-from hpcclear.dynamics.planar.curves import angle_pieces
 
 TURN = 2 * np.pi
 CRANK, ROD, INERTIA = 0.04, 0.145, 0.5
@@ -261,7 +260,7 @@ def test_steps_end_where_no_cubic_follows():
     assert max(counts) < 30
     assert len(breaks(periodic(((0.0, 2.0), (1.0, 2.0)), TURN), 1e-4)) == 0
     cam = tuple((float(t), float(np.sin(TURN * t))) for t in np.linspace(0, 1, 73))
-    assert len(breaks(angle_pieces(cam)[2], 1e-4)) < 60
+    assert len(breaks(spline(cam).derivative().derivative(), 1e-4)) < 60
 
 
 # ---- other variables and other steppers --------------------------------------------------------------

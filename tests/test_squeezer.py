@@ -5,15 +5,14 @@ Data and the state at 0.03 s are those of the Test Set for Initial Value Problem
 
 import numpy as np
 import pytest
-from linkages import load
+from linkages import load, revolute, torque_drive
 from plain_lane import Lane
 from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.drives import TorqueDrive
 from hpcclear.dynamics.linkage.generator import On
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Body, Revolute
+from hpcclear.dynamics.linkage.parts import Body
 
 D, DA, E, EA, ZF, FA, RR, RA = 0.028, 0.0115, 0.02, 0.01421, 0.02, 0.01421, 0.007, 0.00092
 SS, SA, SB, SC, SD, TA, TB = 0.035, 0.01874, 0.01043, 0.018, 0.02, 0.02308, 0.00916
@@ -53,7 +52,7 @@ def squeezer():
     )  # fmt: skip
     ground = {"o": ORIGIN, "a": (-0.06934, -0.00227), "b": (-0.03635, 0.03273), "c": (0.014, 0.072)}
     return Mechanism(
-        bodies, tuple(Revolute(*pin) for pin in pins), (TorqueDrive("motor", "k1", 0.033, 1.0),),
+        bodies, tuple(revolute(*pin) for pin in pins), (torque_drive("motor", "k1", 0.033, 1.0),),
         ground, (load("spring", "spring", first="k3.d", second="ground.c", stiffness=4530.0, length=0.07785),),
     )  # fmt: skip
 

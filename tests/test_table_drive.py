@@ -8,10 +8,9 @@ import pytest
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.drives import TableDrive
 from hpcclear.dynamics.linkage.loops import words_of
-from hpcclear.dynamics.planar.curves import angle_pieces
 from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.scene.driving import PlanarTable
 
 LINKAGES = Path(__file__).parent.parent / "jobs" / "linkages"
 ROCKER = load_scene(LINKAGES / "crank_rocker.toml").with_(
@@ -77,7 +76,7 @@ def test_a_table_of_a_sine_is_the_harmonic_drive():
 
 def test_what_the_kernel_reads_is_what_numpy_is_given_and_derivatives_belong_together():
     rows = ((0.0, 0.3), (0.02, 0.9), (0.05, 0.1), (0.11, -0.4), (0.2, 0.3))
-    drive = TableDrive("cam", "crank", rows, angle_pieces(rows))
+    drive = PlanarTable(name="cam", body="crank", kind="table", angle=rows)
     given = words_of(type("One", (), {"drives": (drive,)})())["table_of_cam"]  # type: ignore[arg-type]
     times = np.linspace(0.0, 0.4, 4001)
     angle, spin, turn = given(times)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import overrides, run
-from linkages import bar, pins
+from linkages import bar, constant_speed, harmonic, pins, torque_drive
 from test_linkage_scenes import ROCKER, rocker
 
 from hpcclear import load_scene, simulate
@@ -16,7 +16,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.dynamics.setup.parameters import parameters
@@ -25,7 +24,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.points import Points
 
 JOBS = Path(__file__).parents[1] / "jobs" / "linkages"
-MOTOR = ConstantSpeed("motor", "crank", 2 * math.pi)
+MOTOR = constant_speed("motor", "crank", 2 * math.pi)
 NOTHING = Points((), np.empty((1, 0)), ())
 LOCKED = "mechanism.bodies.coupler.length=0.088"
 FOUR = (
@@ -187,10 +186,10 @@ def test_what_swings_is_walked_as_far_as_its_drive_swings_it():
     numbers = (0.5, 0.4, 0.6, 0.9, 1.0, 1)  # outside Grashof's rule
     lock = lock_of(*numbers[:5])
     for share, locks in ((0.95, False), (1.05, True)):
-        drive = Harmonic("servo", "crank", share * (lock - 1.0), 2.0, mean=1.0)
+        drive = harmonic("servo", "crank", share * (lock - 1.0), 2.0, mean=1.0)
         told = refused(four_bar(*numbers, ("o3",), drive), 0.0, 1)
         assert (told is not None) == locks
-    torque = TorqueDrive("engine", "crank", 3.0, 5.0)
+    torque = torque_drive("engine", "crank", 3.0, 5.0)
     assert refused(four_bar(*numbers, ("o3",), torque), 0.0, 1) is None  # it may swing
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linkages import constant_speed
 from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
@@ -98,6 +98,6 @@ def test_a_loop_driven_at_a_given_speed_is_held_by_force():
     """What is eased for free linkages is not in the text of others: a dead centre stays one."""
     free = linkage_of(windows(1, 1e-6, 250.0)).mechanism
     bar = free.drives[0].body
-    driven = replace(free, drives=(ConstantSpeed("one", bar, 1.0, period=True),))
+    driven = replace(free, drives=(constant_speed("one", bar, 1.0, period=True),))
     source = [generate(one, On(), Rows()).source for one in (free, driven)]
     assert ["held_inverse" in text for text in source] == [True, False]

@@ -29,13 +29,12 @@ from hpcclear.dynamics.evaluation.recorded.steps import (
     Recording,
 )
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import pins_of, wound_up
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.planar.tables import mechanism_of
+from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integrator_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
@@ -175,12 +174,9 @@ def _response(
     if steady is None and not still:  # what the sample measures as well has its bits
         names += [name for name in impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
-        data["slider_load"] = curve_at(
-            scene.effects.slider_load,
-            data["crank_angle"],
-            turns_of(scene.linkage),
-            scene.numerics.interpolation,
-        )
+        curves = curves_of(scene.linkage, scene.numerics.interpolation)
+        angle, constant = data["crank_angle"], scene.effects.slider_load
+        data["slider_load"] = curves["load"].at(angle) if curves else np.full(len(angle), constant)
     reported = {name: record[name][0] for name in names}
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
     return dataset.dataset(

@@ -29,18 +29,6 @@ def dundurs(moduli: Sequence[Array], ratios: Sequence[Array]) -> tuple[Array, Ar
     return (h_bearing - h_journal) / total, 0.5 * (g_bearing - g_journal) / total
 
 
-def contact_stiffness(
-    h_bearing: Number, h_journal: Number, bearing_radius: Number, clearance: Number
-) -> Number:
-    """Return Hertz's K in N/m^1.5 of a journal in a bearing (paper eq. 4); floats or arrays in SI.
-
-    Eq. 4 as printed lacks R_J and is not dimensionally consistent; this is the form of the cited
-    source, Lankarani and Nikravesh 1990 (doi:10.1115/1.2912617), for internal contact of spheres.
-    """
-    journal_radius = bearing_radius - clearance
-    return sphere_stiffness(h_bearing, h_journal, bearing_radius * journal_radius / clearance)
-
-
 def sphere_stiffness(h_bearing: Number, h_journal: Number, radius: Number) -> Number:
     """Return Hertz's K in N/m^1.5 of a sphere on a plane, or of what is as stiff as one."""
     return 4.0 / (3.0 * (h_bearing + h_journal)) * radius**0.5

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from hpcclear.base.pieces import Rows
+from hpcclear.base.pieces import Pieces, Rows, level, periodic, spline
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
 from hpcclear.scene.fields import (
     Angle,
@@ -43,6 +43,42 @@ class Driving(Table):
     """Whether a turn of this body defines the revolution, or what replaces it: one oscillation, the table, the interval.
     Default: true for the first drive if no drive has this entry."""
 
+    prescribed: ClassVar[bool] = True
+    """Whether the time alone gives the angle of its body."""
+    table: ClassVar[bool] = False
+    """Whether it has a torque over the angle of the body that defines the period."""
+    curves: ClassVar[tuple[str, ...]] = ()
+    """Its tabulated motion: the angle but for what it gains evenly (rad) or the speed (rad/s), and derivatives."""
+
+    @property
+    def straight(self) -> dict[str, Rows]:
+        """Its tables that run straight from row to row, by the names that their parameters begin with."""
+        return {}
+
+
+class FreeDriving(Driving):
+    """What drives have that leave the angle of their body free."""
+
+    prescribed: ClassVar[bool] = False
+
+    @property
+    def usual_speed(self) -> float:
+        """About how fast it turns, rad/s: what is expected, or else what it starts with."""
+        expected: float | None = getattr(self, "expected_speed", None)
+        return self.initial_speed if expected is None else expected  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def seconds(self) -> float:
+        """One revolution of as many turns at the usual speed, s, or the interval in its place."""
+        if by_interval(self):
+            return self.interval  # type: ignore[attr-defined, no-any-return]
+        return 2 * math.pi * self.turns / abs(self.usual_speed)  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def advance(self) -> float:
+        """By how much the angle changes until then, rad; 0 where a time replaces the revolution."""
+        return 0.0 if by_interval(self) else 2 * math.pi * self.turns  # type: ignore[attr-defined]
+
 
 class CrankSpeed(Table):
     """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
@@ -65,6 +101,16 @@ class CrankSpeed(Table):
 class PlanarSpeed(Driving, CrankSpeed):
     """A body turns at a constant speed."""
 
+    @property
+    def seconds(self) -> float:
+        """One revolution of as many turns, s."""
+        return 2 * math.pi * self.turns / abs(self.speed)
+
+    @property
+    def advance(self) -> float:
+        """By how much the angle changes until then, rad: negative clockwise."""
+        return math.copysign(2 * math.pi * self.turns, self.speed)
+
 
 class PlanarHarmonic(Driving):
     """A body oscillates: mean + amplitude sin(2 pi frequency t + phase)."""
@@ -79,6 +125,14 @@ class PlanarHarmonic(Driving):
     phase: Angle = 0.0
     """Phase at time 0, rad."""
 
+    turns: ClassVar[int] = 1
+    advance: ClassVar[float] = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """One swing to and fro, s."""
+        return 1 / self.frequency
+
 
 class PlanarTable(Driving):
     """A body follows a table of angles."""
@@ -88,6 +142,26 @@ class PlanarTable(Driving):
     """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats from the last time on. The last angle equals
     the first one, or differs from it by one turn (plus: counter-clockwise, minus: clockwise). Values in between follow
     a periodic cubic spline."""
+
+    turns: ClassVar[int] = 1
+    curves: ClassVar[tuple[str, ...]] = ("angle", "spin", "turn")
+
+    @property
+    def pieces(self) -> tuple[Pieces, ...]:
+        """Those of its `curves`, exact derivatives, so that what is integrated belongs to where things are."""
+        angle = spline(self.angle)
+        spin = angle.derivative()
+        return angle, spin, spin.derivative()
+
+    @property
+    def seconds(self) -> float:
+        """Until it repeats, s."""
+        return self.angle[-1][0]
+
+    @property
+    def advance(self) -> float:
+        """What is gained until then, rad: a turn, either way round, or nothing."""
+        return 2 * math.pi * round((self.angle[-1][1] - self.angle[0][1]) / (2 * math.pi))
 
     def _check(self) -> None:
         if self.angle[0][0] != 0.0:
@@ -149,18 +223,34 @@ class CrankTorque(Table):
             )  # fmt: skip
 
 
-class PlanarTorque(Driving, CrankTorque):
+class PlanarTorque(FreeDriving, CrankTorque):
     """A torque acts on a free body."""
 
     interval: Interval | None = None
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
+
+    @property
+    def table(self) -> bool:  # type: ignore[override]
+        """Whether its torque follows a curve over the angle."""
+        return isinstance(self.torque, tuple)
+
+    @property
+    def straight(self) -> dict[str, Rows]:
+        """Its table over the speed."""
+        rows = self.torque_by_speed
+        return {} if rows is None else {f"{self.name}_by_speed": rows}
+
+    def curve(self, turns: int, interpolation: str) -> Pieces:
+        """The curve that its torque follows; `turns`: until tables repeat."""
+        assert isinstance(self.torque, tuple)
+        return periodic(self.torque, 2.0 * math.pi * turns, interpolation)
 
     def _check(self) -> None:
         if by_interval(self) and self.turns != 1:
             raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
 
 
-class PlanarFree(Driving):
+class PlanarFree(FreeDriving):
     """No drive: the mechanism is let go, and moves by its loads and its weight. A time replaces the revolution."""
 
     kind: Literal["free"]
@@ -169,8 +259,10 @@ class PlanarFree(Driving):
     initial_speed: Annotated[float, Quantity("rad/s")] = 0.0
     """Angular speed of the body at the start, rad/s, counter-clockwise; negative: clockwise."""
 
+    turns: ClassVar[int] = 1
 
-class PlanarRunUp(Driving):
+
+class PlanarRunUp(FreeDriving):
     """A body turns at a prescribed speed that depends on time, such as a run-up, independent of the torque that this
     requires."""
 
@@ -182,6 +274,24 @@ class PlanarRunUp(Driving):
     """Moment of inertia of a flywheel on the body, kg m2."""
     turns: Turns = 1
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    curves: ClassVar[tuple[str, ...]] = ("speed", "rise")
+
+    @property
+    def pieces(self) -> tuple[Pieces, ...]:
+        """Those of its `curves`, up to the last row, where the speed stays."""
+        speed = level(self.speed_by_time)
+        return speed, speed.derivative()
+
+    @property
+    def initial_speed(self) -> float:
+        """Where its table begins, rad/s."""
+        return self.speed_by_time[0][1]
+
+    @property
+    def expected_speed(self) -> float:
+        """The largest of its table, rad/s."""
+        return max(speed for _, speed in self.speed_by_time)
 
     def _check(self) -> None:
         speeds = [speed for _, speed in self.speed_by_time]

@@ -2,7 +2,7 @@
 `dynamics/planar/tables.py` makes a mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeGuard, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -138,6 +138,19 @@ class PlanarBody(Table):
             return self.inertia
         return self.inertia_ratio * slender_inertia(self.mass, self.length)
 
+    @property
+    def own_center(self) -> tuple[float, float]:
+        """Its mass centre in its own axes, m, however that is stated."""
+        if self.length is None:
+            return self.center.x, self.center.y
+        return (0.5 * self.length if self.mass_center is None else self.mass_center), 0.0
+
+    @property
+    def own_points(self) -> dict[str, tuple[float, float]]:
+        """Its points in its own axes, m; a bar has a and b besides those that are written."""
+        ends = {} if self.length is None else {"a": (0.0, 0.0), "b": (self.length, 0.0)}
+        return ends | {point.name: (point.x, point.y) for point in self.points}
+
     def _check(self) -> None:
         if self.length is None:
             for key, meaning, instead in (
@@ -233,10 +246,17 @@ class PlanarFixed(Table):
     """Angle of the body relative to the ground, rad."""
 
 
-PlanarJoint = Annotated[
-    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarSlot | PlanarFixed,
-    Field(discriminator="kind"),
-]
+Pin = PlanarRevolute | PlanarClearance
+Aligned = PlanarSlide | PlanarSlot | PlanarFixed
+"""Joints with a line."""
+Loose = PlanarClearance | PlanarSlide | PlanarSlot
+"""Tables of joints that may have clearance."""
+PlanarJoint = Annotated[Pin | Aligned, Field(discriminator="kind")]
+
+
+def is_loose(joint: PlanarJoint) -> TypeGuard[Loose]:
+    """Whether a joint has clearance."""
+    return getattr(joint, "clearance", None) is not None
 
 
 class Planar(Table):
@@ -257,9 +277,7 @@ class Planar(Table):
 
     def _check(self) -> None:
         if self.followed is not None:
-            places = [
-                f"{body.name}.{point}" for body in self.bodies for point in names_of_points(body)
-            ]
+            places = [f"{body.name}.{point}" for body in self.bodies for point in body.own_points]
             if self.followed not in places:
                 raise invalid("is no point of a body", nearest(self.followed, places), "followed")
 
@@ -311,15 +329,9 @@ def _with_model(table: str, name: str, rows: Mapping[str, object]) -> object:
     return {key: value for key, value in made.items() if key != "like"}
 
 
-def names_of_points(body: PlanarBody) -> tuple[str, ...]:
-    """Points of a body; a bar has a and b besides those that are written."""
-    own = () if body.length is None else ("a", "b")
-    return (*own, *(point.name for point in body.points))
-
-
 def turns_of(planar: Planar) -> int:
     """Turns of the driven body in a revolution."""
-    return getattr(main_drive(planar), "turns", 1)
+    return main_drive(planar).turns
 
 
 def main_drive(planar: Planar) -> PlanarDrive:

@@ -18,18 +18,15 @@ from hpcclear.scene.about import About, inputs_of
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Table, nearest
-from hpcclear.scene.joints import Guide, PlanarSlot
+from hpcclear.scene.joints import Guide
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
-from hpcclear.scene.planar import BarBending, Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import BarBending, Loose, Planar, PlanarClearance, is_loose
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 from hpcclear.scene.study import Study
 from hpcclear.scene.surfaces import Film, Lives
-
-Loose = PlanarClearance | PlanarSlide | PlanarSlot
-"""Tables of joints that may have clearance."""
 
 
 class SceneTables(Table):
@@ -203,9 +200,7 @@ class SceneTables(Table):
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Names of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        return tuple(
-            joint.name for joint in self.linkage.joints if getattr(joint, "clearance", None)
-        )
+        return tuple(joint.name for joint in self.linkage.joints if is_loose(joint))
 
     def contact_labels(self) -> tuple[str, ...]:
         """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a

@@ -83,7 +83,11 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
 
 
 def shape(get: Get) -> Shape:
-    """Numbers of a joint's samples."""
+    """Numbers of a joint's samples.
+
+    Paper eq. 4 as printed lacks R_J in the stiffness and is not dimensionally consistent; this is the form of the cited
+    source, Lankarani and Nikravesh 1990 (doi:10.1115/1.2912617), for internal contact of spheres.
+    """
     clearance, bearing = get("clearance"), get("bearing_radius")
     journal = bearing - clearance
     radii = (clearance, bearing, journal)

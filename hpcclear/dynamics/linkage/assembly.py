@@ -12,8 +12,17 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight, uncentred
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Number, Pair, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Number,
+    Pair,
+    as_complex,
+    places_of,
+    split,
+    start_of,
+)
 from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.scene.planar import PlanarFixed, PlanarSlide
 
 MOST_STEPS = 40
 MOST_TRIES = 12
@@ -178,7 +187,10 @@ def _eccentricities(loops: Loops) -> Array:
     wanted: list[Number] = [0.0] * len(loops.owners)
     for joint in loops.mechanism.clearances:
         rows = [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
-        for r, apart in zip(rows, joint.start_eccentricity, strict=True):
+        start = start_of(joint)
+        if isinstance(joint, PlanarSlide):
+            start = start[0], np.sin(start[1])
+        for r, apart in zip(rows, start, strict=True):
             wanted[r] = apart
     return np.array(np.broadcast_arrays(*wanted), float)
 
@@ -186,7 +198,9 @@ def _eccentricities(loops: Loops) -> Array:
 def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
     """From rough angles; where these lead into a corner, from angles near them, further and further off."""
     rng = np.random.default_rng(0)  # the same tries for the same mechanism
-    guided = {split(joint.point)[0] for joint in loops.mechanism.joints if isinstance(joint, Slide)}
+    guided = {
+        split(joint.point)[0] for joint in loops.mechanism.joints if isinstance(joint, PlanarSlide)
+    }
     angles = np.array(
         [one.kind == "angle" and one.body not in guided for one in loops.forest.coordinates], float
     )
@@ -259,12 +273,12 @@ def rough_pose(loops: Loops) -> Array:
 
     while len(placed) <= len(bodies):
         for joint in mechanism.joints:
-            for own, other in (joint.places, joint.places[::-1]):
+            for own, other in (places_of(joint), places_of(joint)[::-1]):
                 body, carrier = split(own)[0], split(other)[0]
                 if body in placed or carrier not in placed:
                     continue
                 angle: Number = bodies[body].start_angle
-                if isinstance(joint, (Slide, Fixed)):
+                if isinstance(joint, (PlanarSlide, PlanarFixed)):
                     turned = joint.angle if own == joint.point else -joint.angle
                     angle = placed[carrier][1] + turned
                 turn = np.exp(1j * np.asarray(angle))

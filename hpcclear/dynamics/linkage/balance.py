@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics, Move, Mover, Point
-from hpcclear.dynamics.linkage.parts import GROUND, Body, split
+from hpcclear.dynamics.linkage.parts import GROUND, Body, places_of, split
 from hpcclear.dynamics.linkage.trees import Forest
+from hpcclear.scene.driving import Driving
 
 Held = tuple[str, Vector]
 """A vector held in a frame."""
@@ -294,6 +295,6 @@ def _falling(forest: Forest) -> set[str]:
     roots = {body: root_of(forest, body) for body in forest.hangs}
     held = {GROUND}
     for one in forest.closures:
-        names = [split(p)[0] for p in one.places] if hasattr(one, "places") else [one.body]
+        names = [one.body] if isinstance(one, Driving) else [split(p)[0] for p in places_of(one)]
         held |= {roots.get(name, GROUND) for name in names}
     return {body for body, root in roots.items() if root not in held}

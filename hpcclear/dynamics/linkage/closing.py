@@ -7,19 +7,12 @@ what c'' has to be besides them.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, Drive, RunUp
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Aligned,
-    Fixed,
-    Joint,
-    Revolute,
-    Slide,
-    Slot,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
+from hpcclear.scene.driving import PlanarDrive, PlanarRunUp, PlanarSpeed
+from hpcclear.scene.joints import PlanarSlot
+from hpcclear.scene.planar import Aligned, Pin, PlanarFixed, PlanarJoint, PlanarSlide
 
 
 class ClosureRow(NamedTuple):
@@ -44,15 +37,15 @@ class Closing:
     kinematics: Kinematics
     writer: Writer
 
-    def rows(self, one: Joint | Drive) -> list[ClosureRow]:
+    def rows(self, one: PlanarJoint | PlanarDrive) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
-        if isinstance(one, Revolute):
+        if isinstance(one, Pin):
             return self._pin(one)
-        if isinstance(one, Slide):
+        if isinstance(one, PlanarSlide):
             return self._guide(one)
-        if isinstance(one, Slot):
+        if isinstance(one, PlanarSlot):
             return self._guide(one)[:1]
-        assert not isinstance(one, Fixed)
+        assert not isinstance(one, PlanarFixed)
         return [self._driven(one)]
 
     def _row(
@@ -73,13 +66,13 @@ class Closing:
         asked = asked - alpha2 * rate - beta2 * error
         return ClosureRow(name, free, asked, others, error, rate)
 
-    def _pin(self, joint: Revolute) -> list[ClosureRow]:
+    def _pin(self, joint: Pin) -> list[ClosureRow]:
         kin = self.kinematics
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
         error = kin.position(journal) - kin.position(bearing)
-        rate = self.rate(*joint.places)
+        rate = self.rate(*places_of(joint))
         rest = self.unforced(journal) - self.unforced(bearing)
-        columns = self.between(*joint.places)
+        columns = self.between(*places_of(joint))
         return [
             self._row(
                 f"{joint.name}_{axis}", {c: getattr(v, axis) for c, v in columns.items()},
@@ -117,20 +110,20 @@ class Closing:
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
-    def _guide(self, joint: Slide | Slot) -> list[ClosureRow]:
+    def _guide(self, joint: PlanarSlide | PlanarSlot) -> list[ClosureRow]:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
-        body, carrier = (split(place)[0] for place in joint.places)
+        body, carrier = (split(place)[0] for place in places_of(joint))
         own, other = forest.frames[body], forest.frames[carrier]
         along = self.direction(joint)
         normal = along.across()
         point, line = kin.point(joint.point), kin.point(joint.line)
         apart = kin.position(point) - kin.position(line)
-        rate = self.rate(*joint.places)
+        rate = self.rate(*places_of(joint))
         rest = self.unforced(point) - self.unforced(line)
         spin = kin.spin(other)
-        columns = {c: dot(v, normal) for c, v in self.between(*joint.places).items()}
+        columns = {c: dot(v, normal) for c, v in self.between(*places_of(joint)).items()}
         if other != GROUND:
             apart = Vector(*(write.let(f"apart_{joint.name}", part) for part in apart))
             turns = Mover("angle", other)
@@ -150,18 +143,18 @@ class Closing:
             f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted
         )]  # fmt: skip
 
-    def sliding(self, joint: Slide) -> tuple[dict[Mover, Term], Term]:
+    def sliding(self, joint: PlanarSlide) -> tuple[dict[Mover, Term], Term]:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
         kin, along = self.kinematics, self.direction(joint)
         normal = along.across()
-        point, line = (kin.position(kin.point(place)) for place in joint.places)
+        point, line = (kin.position(kin.point(place)) for place in places_of(joint))
         aside = self.writer.let(f"aside_{joint.name}", dot(point - line, normal))
-        moved = {c: dot(v, along) for c, v in self.between(*joint.places).items()}
+        moved = {c: dot(v, along) for c, v in self.between(*places_of(joint)).items()}
         carrier = kin.forest.frames[split(joint.line)[0]]
         if carrier != GROUND:
             turns = Mover("angle", carrier)
             moved[turns] = moved.get(turns, ZERO) + aside
-        speed = dot(self.rate(*joint.places), along) + kin.spin(carrier) * aside
+        speed = dot(self.rate(*places_of(joint)), along) + kin.spin(carrier) * aside
         return {c: term for c, term in moved.items() if term}, self.writer.let(
             f"v_{joint.name}", speed
         )
@@ -178,18 +171,18 @@ class Closing:
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
 
-    def run_up(self, drive: RunUp, speed: Term, rise: Term) -> ClosureRow:
+    def run_up(self, drive: PlanarRunUp, speed: Term, rise: Term) -> ClosureRow:
         """A free body's acceleration as its drive has it; what its speed is off by is fed back."""
         own = self.kinematics.forest.frames[drive.body]
         rate = self.kinematics.spin(own) - speed
         return self._row(f"{drive.name}_angle", {Mover("angle", own): ONE}, -rise, rate, ZERO)
 
-    def _driven(self, drive: Drive) -> ClosureRow:
+    def _driven(self, drive: PlanarDrive) -> ClosureRow:
         kin, name = self.kinematics, f"{drive.name}_drive"
         angle, spin, turn = kin.driven(drive, name)
         own = kin.forest.frames[drive.body]
         error = named(f"angle_{own}") - angle
-        if isinstance(drive, ConstantSpeed) and drive is not kin.forest.mechanism.period:
+        if isinstance(drive, PlanarSpeed) and drive is not kin.forest.mechanism.period:
             # its angle does not restart with the period
             apart = self.writer.let(f"apart_{drive.name}", error)
             names = (f"s_{name}", f"c_{name}")

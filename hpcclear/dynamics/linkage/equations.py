@@ -6,16 +6,17 @@ from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
-from hpcclear.dynamics.linkage.drives import TorqueDrive
 from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Contact, Revolute, split
+from hpcclear.dynamics.linkage.parts import GROUND, Contact, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
 from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.scene.driving import PlanarTorque
+from hpcclear.scene.planar import Aligned, Pin
 
 RESERVED = (
     *keyword.kwlist, "effects", "joints", "work", "par", "i", "W", "at", "abs", "np", "sincos", "saturated", *functions(),
@@ -103,14 +104,12 @@ class MotionEquations:
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 
-    def torque(self, drive: TorqueDrive) -> tuple[Mover, Term]:
+    def torque(self, drive: PlanarTorque) -> tuple[Mover, Term]:
         """What a drive exerts, and along which column."""
         write = self.writer
-        if drive.by_speed is not None:
+        for name, rows in drive.straight.items():
             speed = self.kinematics.spin(self.forest.frames[drive.body])
-            name = f"{drive.name}_by_speed"
-            row = self.rows.places.get(name)
-            torque = piecewise.term(write, name, len(drive.by_speed), speed, row)
+            torque = piecewise.term(write, name, len(rows), speed, self.rows.places.get(name))
             return Mover("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
@@ -207,7 +206,7 @@ class MotionEquations:
         n = len(self.columns)
         pins: dict[str, tuple[str, str]] = {}
         for one in self.forest.closures:
-            if isinstance(one, Revolute):
+            if isinstance(one, Pin):
                 names = (f"{one.name}_x", f"{one.name}_y")
                 pins |= dict.fromkeys(names, names)
         numbers = {row.name: r for r, row in enumerate(self.constraints, n)}

@@ -11,16 +11,17 @@ from dataclasses import dataclass, field
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.acting import Acting
 from hpcclear.dynamics.linkage.closing import dot
-from hpcclear.dynamics.linkage.drives import Drive, Release, RunUp, TorqueDrive, straight_of
 from hpcclear.dynamics.linkage.equations import MotionEquations
 from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
+from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingPin
 from hpcclear.dynamics.linkage.trees import Forest
+from hpcclear.scene.driving import PlanarDrive, PlanarFree, PlanarRunUp, PlanarTorque
+from hpcclear.scene.planar import PlanarRevolute, PlanarSlide
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,11 @@ class _Generator(MotionEquations):
                 self.rows.places,
             )  # fmt: skip
             self.load_power = self.load_power + load.act(acting)
-        free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
-        torques = [self.torque(d) for d in free if not isinstance(d, (RunUp, Release))]
+        drives = self.mechanism.drives
+        torques = [self.torque(drive) for drive in drives if isinstance(drive, PlanarTorque)]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
-        for drive in free:
-            if isinstance(drive, RunUp):
+        for drive in drives:
+            if isinstance(drive, PlanarRunUp):
                 given = (self.turned(f"{drive.name}.{part}") for part in drive.curves)
                 self.constraints.append(self.closing.run_up(drive, *given))
         found = self.solved(torques)
@@ -115,7 +116,7 @@ class _Generator(MotionEquations):
     def _store(self, found: dict[int, Term], torques: dict[Mover, Term]) -> None:
         on, write = self.on, self.writer
         for drive in self.mechanism.drives:
-            for name in straight_of(drive):  # the rate of a speed is known last
+            for name in drive.straight:  # the rate of a speed is known last
                 if name in self.rows.places:
                     angle = self.number[Mover("angle", self.forest.frames[drive.body])]
                     row = self.rows.places[name] + at.MAX_CURVES
@@ -156,7 +157,9 @@ class _Generator(MotionEquations):
 
     def _pins(self, found: dict[int, Term]) -> None:
         """Forces of the ideal pins on their journals' bodies."""
-        for k, joint in enumerate(j for j in self.mechanism.joints if type(j) is Revolute):
+        for k, joint in enumerate(
+            j for j in self.mechanism.joints if isinstance(j, PlanarRevolute)
+        ):
             pin = RubbingPin(joint, self)
             on_bearing = pin.body is not None and pin.body != split(joint.journal)[0]
             for axis, part in enumerate(pin.pushes(found)):
@@ -229,13 +232,15 @@ class _Generator(MotionEquations):
         self._rate(at.FOLLOWED_ACROSS, y)
         self._rate(at.FOLLOWED_SQUARE, x * x + y * y)
 
-    def _drives(self) -> list[Drive]:
+    def _drives(self) -> list[PlanarDrive]:
         main = self.mechanism.period
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
-    def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Mover, Term]) -> Term:
+    def _moment(
+        self, drive: PlanarDrive, found: dict[int, Term], torques: dict[Mover, Term]
+    ) -> Term:
         """Moment of a drive: what is given, or what the prescribed angle requires."""
-        if isinstance(drive, Release):
+        if isinstance(drive, PlanarFree):
             return ZERO
         column = Mover("angle", self.forest.frames[drive.body])
         if column in torques:
@@ -250,7 +255,7 @@ class _Generator(MotionEquations):
         self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
 
 
-def _guide_of(mechanism: Mechanism, body: str) -> Slide:
+def _guide_of(mechanism: Mechanism, body: str) -> PlanarSlide:
     """The guide that a body's place moves along."""
-    guides = [joint for joint in mechanism.joints if isinstance(joint, Slide)]
+    guides = [joint for joint in mechanism.joints if isinstance(joint, PlanarSlide)]
     return next(joint for joint in guides if split(joint.point)[0] == body)

@@ -10,16 +10,17 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
-from hpcclear.dynamics.linkage.drives import curves_of, straight_of
 from hpcclear.dynamics.linkage.generator import Motion, On, generate
+from hpcclear.dynamics.linkage.look_ups import curves_of
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import Number, Revolute
+from hpcclear.dynamics.linkage.parts import Number
 from hpcclear.dynamics.linkage.piecewise import starts
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
+from hpcclear.scene.planar import PlanarRevolute
 
 
 class Linkage:
@@ -68,7 +69,7 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
-        count = sum(type(joint) is Revolute for joint in mechanism.joints)
+        count = sum(isinstance(joint, PlanarRevolute) for joint in mechanism.joints)
         if count > at.MAX_PINS:
             raise InputError(
                 "mechanism.joints", count, f"more than {at.MAX_PINS} pins without clearance", "Use fewer bodies"
@@ -140,9 +141,7 @@ class Linkage:
     def straight(self) -> dict[str, list[str]]:
         """Tables that run straight from row to row, and the parameters that say where they bend."""
         parts = (*self.mechanism.drives, *self.mechanism.loads)
-        return {
-            name: starts(name, rows) for one in parts for name, rows in straight_of(one).items()
-        }
+        return {name: starts(name, rows) for one in parts for name, rows in one.straight.items()}
 
     @property
     def bends(self) -> list[list[int]]:

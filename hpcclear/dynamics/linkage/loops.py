@@ -14,13 +14,13 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.closing import Closing
-from hpcclear.dynamics.linkage.drives import TableDrive
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import Number
 from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.scene.driving import Driving, PlanarTable
 
 
 def sincos(angle: Array) -> tuple[Array, Array]:
@@ -73,7 +73,7 @@ def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, .
     return {
         f"table_of_{drive.name}": partial(_all_at, drive.pieces)
         for drive in mechanism.drives
-        if isinstance(drive, TableDrive)
+        if isinstance(drive, PlanarTable)
     }
 
 
@@ -116,7 +116,7 @@ class Loops:
         texts: list[str] = []
         places: list[tuple[int, int]] = []
         for one in self.forest.closures:
-            table = "joints" if hasattr(one, "places") else "drives"
+            table = "drives" if isinstance(one, Driving) else "joints"
             for row in closing.rows(one):
                 r = len(owners)
                 owners.append(f"{table}.{one.name}")

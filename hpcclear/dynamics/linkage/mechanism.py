@@ -7,28 +7,27 @@ from typing import Any
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
-from hpcclear.dynamics.linkage.drives import (
-    Drive,
-    Harmonic,
-    LoadTerms,
-    Release,
-    RunUp,
-    TableDrive,
-    TorqueDrive,
-    seconds_of,
-)
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Body,
     Contact,
-    Fixed,
-    Joint,
-    Loose,
     Pair,
-    Revolute,
-    Slide,
-    Slot,
+    contacts_of,
+    places_of,
     split,
+)
+from hpcclear.scene import driving
+from hpcclear.scene.driving import PlanarDrive
+from hpcclear.scene.joints import PlanarSlot
+from hpcclear.scene.loads.declared import Load
+from hpcclear.scene.planar import (
+    Loose,
+    Pin,
+    PlanarFixed,
+    PlanarJoint,
+    PlanarRevolute,
+    PlanarSlide,
+    is_loose,
 )
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -45,10 +44,10 @@ class Mechanism:
     """
 
     bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    drives: tuple[Drive, ...]
+    joints: tuple[PlanarJoint, ...]
+    drives: tuple[PlanarDrive, ...]
     ground: Mapping[str, Pair] = field(default_factory=lambda: {"o": (0.0, 0.0)})
-    loads: tuple[LoadTerms, ...] = ()
+    loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:
         for check in (_names, _places, _numbers, _connected, _drives, _sizes):
@@ -66,35 +65,37 @@ class Mechanism:
     @property
     def clearances(self) -> tuple[Loose, ...]:
         """The joints with clearance, in file order."""
-        return tuple(joint for joint in self.joints if isinstance(joint, Loose))
+        return tuple(joint for joint in self.joints if is_loose(joint))
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Their contacts, joint by joint."""
-        return tuple(contact for joint in self.clearances for contact in joint.contacts)
+        return tuple(contact for joint in self.clearances for contact in contacts_of(joint))
 
     @property
-    def ideal(self) -> tuple[Joint, ...]:
+    def ideal(self) -> tuple[PlanarJoint, ...]:
         """The joints without."""
-        return tuple(joint for joint in self.joints if not isinstance(joint, Loose))
+        return tuple(joint for joint in self.joints if not is_loose(joint))
 
     @property
-    def period(self) -> Drive:
+    def period(self) -> PlanarDrive:
         """The drive whose turn is the revolution."""
         return next((drive for drive in self.drives if drive.period), self.drives[0])
 
     @property
     def free(self) -> bool:
         """Whether torques alone drive it."""
-        return all(type(drive) in (TorqueDrive, Release) for drive in self.drives)
+        return all(
+            isinstance(drive, (driving.PlanarTorque, driving.PlanarFree)) for drive in self.drives
+        )
 
     @property
     def clocked(self) -> bool:
         """Whether a load or drive goes by the time since the start."""
-        by_drive = any(isinstance(drive, RunUp) for drive in self.drives)
-        return by_drive or any(map(seconds_of, self.loads))
+        by_drive = any(isinstance(drive, driving.PlanarRunUp) for drive in self.drives)
+        return by_drive or any(load.seconds for load in self.loads)
 
-    def drive_of(self, body: str) -> Drive | None:
+    def drive_of(self, body: str) -> PlanarDrive | None:
         """What drives a body."""
         return next((drive for drive in self.drives if drive.body == body), None)
 
@@ -134,7 +135,7 @@ def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> lis
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
     for joint in mechanism.joints if kinds is object else mechanism.ideal:
         if isinstance(joint, kinds):
-            groups = _merged(groups, {split(place)[0] for place in joint.places})
+            groups = _merged(groups, {split(place)[0] for place in places_of(joint)})
     return sorted(groups, key=lambda group: GROUND not in group)
 
 
@@ -190,17 +191,17 @@ def _places(m: Mechanism) -> None:
                 )  # fmt: skip
     _turned(m)
     for joint in m.joints:
-        first, second = (split(place)[0] for place in joint.places)
+        first, second = (split(place)[0] for place in places_of(joint))
         if first == second:
             raise InputError(
                 f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
             )
-        if isinstance(joint, Fixed) and second != GROUND:
+        if isinstance(joint, PlanarFixed) and second != GROUND:
             raise InputError(
                 f"joints.{joint.name}.line", joint.line, "a body can be fixed to the ground only",
                 "Name a point of the ground, or make one body of the two",
             )  # fmt: skip
-        if isinstance(joint, Slide) and first == GROUND:
+        if isinstance(joint, PlanarSlide) and first == GROUND:
             raise InputError(
                 f"joints.{joint.name}.point", joint.point, "the ground cannot be the sliding body",
                 "Swap point and line",
@@ -209,14 +210,14 @@ def _places(m: Mechanism) -> None:
 
 def coupled(m: Mechanism) -> list[set[str]]:
     """Bodies whose angles the joints or loads compare with one another, the ground's first: sets of names."""
-    groups = joined(m, (Slide, Fixed))
+    groups = joined(m, (PlanarSlide, PlanarFixed))
     for load in m.loads:
         if load.by_angle and (other := getattr(load, "other", None)):
             groups = _merged(groups, {str(getattr(load, "body", "")), other})
     return sorted(groups, key=lambda names: GROUND not in names)
 
 
-def gain_of(m: Mechanism, drive: Drive) -> float:
+def gain_of(m: Mechanism, drive: PlanarDrive) -> float:
     """By how much the body of a prescribed drive, or of the one that gives the period, turns in a revolution, rad."""
     main = m.period
     if drive is main or not main.prescribed:
@@ -227,7 +228,7 @@ def gain_of(m: Mechanism, drive: Drive) -> float:
 def _turned(m: Mechanism) -> None:
     """Bodies whose angles loads act by can turn, and the angle does not go round and round with the revolutions: that of one
     body, or between two."""
-    still, *_ = joined(m, (Slide, Fixed))
+    still, *_ = joined(m, (PlanarSlide, PlanarFixed))
     gains: dict[str, set[float]] = {}
     for names in coupled(m):
         driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
@@ -265,11 +266,11 @@ def _numbers(m: Mechanism) -> None:
                 "Write the moment of inertia about its mass centre in kg m2, or put an ideal pin off its mass centre",
             )  # fmt: skip
     for drive in m.drives:
-        if isinstance(drive, Harmonic) and drive.amplitude == 0:
+        if isinstance(drive, driving.PlanarHarmonic) and drive.amplitude == 0:
             key = f"drives.{drive.name}.amplitude"
             raise InputError(key, 0.0, "there would be no motion", "Write an amplitude")
     for joint in m.ideal:
-        if isinstance(joint, Revolute) and joint.friction is not None and modes_of(m):
+        if isinstance(joint, PlanarRevolute) and joint.friction is not None and modes_of(m):
             raise InputError(
                 f"joints.{joint.name}.friction", joint.friction.coefficient,
                 "reactions of pins are not modelled where a bar bends", "Remove it, or bending",
@@ -282,19 +283,19 @@ def massless_angles(m: Mechanism) -> set[str]:
     An ideal pin off the mass centre, or a guide, to a body that cannot makes it regular.
     """
     found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m)
-    found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
+    found -= {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
     left = len(m.bodies) + 1
     while len(found) < left:
         left = len(found)
         for joint in m.ideal:
-            (one, point), (two, other) = map(split, joint.places)
+            (one, point), (two, other) = map(split, places_of(joint))
             for body, here, carrier in ((one, point, two), (two, other, one)):
                 if body not in found or carrier in found:
                     continue
-                if isinstance(joint, Revolute):
+                if isinstance(joint, Pin):
                     held = tuple(m.body(body).points[here]) != tuple(m.body(body).center)
                 else:
-                    held = isinstance(joint, (Slide, Fixed))
+                    held = isinstance(joint, (PlanarSlide, PlanarFixed))
                 found -= {body} if held else set()
     return found
 
@@ -307,7 +308,7 @@ def turning(m: Mechanism, held_by: tuple[type, ...] | None = None) -> set[str]:
         if (drive.prescribed if held_by is None else isinstance(drive, held_by))
     }
     still: set[str] = set()
-    for group in joined(m, (Slide, Fixed)):
+    for group in joined(m, (PlanarSlide, PlanarFixed)):
         if GROUND in group or group & held:
             still |= group
     return {body.name for body in m.bodies} - still
@@ -331,14 +332,14 @@ def _drives(m: Mechanism) -> None:
             "drives", None, "nothing drives the mechanism",
             'Add [drives.NAME] with a kind, say "constant-speed", and a body; "free" with an interval lets it go',
         )  # fmt: skip
-    groups = joined(m, (Slide, Fixed))
+    groups = joined(m, (PlanarSlide, PlanarFixed))
     driven: dict[int, str] = {}
     for drive in m.drives:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
-        if GROUND in groups[group] and not isinstance(drive, Release):
+        if GROUND in groups[group] and not isinstance(drive, driving.PlanarFree):
             raise InputError(
                 f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
-                "Drive a body on a revolute joint",
+                "PlanarDrive a body on a revolute joint",
             )  # fmt: skip
         if group in driven:
             raise InputError(
@@ -359,7 +360,7 @@ def _one_period(m: Mechanism) -> None:
         )  # fmt: skip
     main = m.period
     for drive in m.drives:
-        if drive is not main and isinstance(drive, TableDrive) and drive.advance:
+        if drive is not main and isinstance(drive, driving.PlanarTable) and drive.advance:
             raise InputError(
                 f"drives.{drive.name}.angle", drive.advance, "goes round by full turns, but another drive defines the period",
                 "End it at the angle where it began, or set period = true here",
@@ -377,7 +378,7 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {Revolute: 2, Slide: 2, Slot: 1, Fixed: 3}
+    taken = {PlanarRevolute: 2, PlanarSlide: 2, PlanarSlot: 1, PlanarFixed: 3}
     ideal = sum(taken[type(joint)] for joint in m.ideal)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 

@@ -6,12 +6,13 @@ import numpy as np
 
 from hpcclear.base.pieces import hinges
 from hpcclear.dynamics.linkage import bending
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Aligned, Number, split
+from hpcclear.dynamics.linkage.parts import Number, split
 from hpcclear.dynamics.linkage.trees import Forest, forest
+from hpcclear.scene.driving import PlanarHarmonic, PlanarSpeed, PlanarTable, PlanarTorque
+from hpcclear.scene.planar import Aligned
 
 
 def values(
@@ -31,8 +32,9 @@ def values(
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
         rubs = getattr(joint, "friction", None)
         if rubs is not None:
-            found[f"{joint.name}_coefficient"] = rubs.coefficient * rubs.radius
-            found[f"{joint.name}_inverse_ramp"] = rubs.radius / rubs.ramp_speed
+            radius = getattr(rubs, "radius", 1.0)  # of a pin, which makes torques of forces
+            found[f"{joint.name}_coefficient"] = rubs.coefficient * radius
+            found[f"{joint.name}_inverse_ramp"] = radius / rubs.ramp_speed
     _outside(trees, found)
     return found
 
@@ -41,7 +43,7 @@ def _bodies(trees: Forest, found: dict[str, Number]) -> None:
     mechanism = trees.mechanism
     for body in mechanism.bodies:
         drive = mechanism.drive_of(body.name)
-        inertia = body.inertia + (drive.inertia if isinstance(drive, TorqueDrive) else 0.0)
+        inertia = body.inertia + getattr(drive, "flywheel_inertia", 0.0)
         some = inertia + 1.0 * (np.asarray(inertia) == 0.0)[()]  # what is divided by
         inertia = some if trees.cartesian else inertia  # there 1 for what does not turn
         places = {**body.points, CENTER: body.center}
@@ -81,23 +83,25 @@ def _outside(trees: Forest, found: dict[str, Number]) -> None:
         start = trees.mechanism.body(drive.body).start_angle - trees.offsets[drive.body]
         found |= {f"{frame}_start": start, f"{drive.name}_drive_start": start}
         match drive:
-            case ConstantSpeed():
+            case PlanarSpeed():
                 found[f"{drive.name}_speed"] = drive.speed
-            case Harmonic():
+            case PlanarHarmonic():
                 found[f"{drive.name}_mean"] = drive.mean - trees.offsets[drive.body]
                 found[f"{drive.name}_amplitude"] = drive.amplitude
                 found[f"{drive.name}_rate"] = 2 * math.pi * drive.frequency
                 found[f"{drive.name}_phase"] = drive.phase
-            case TableDrive():
+            case PlanarTable():
                 found[f"{drive.name}_rate"] = drive.advance / drive.seconds
                 found[f"{drive.name}_shift"] = trees.offsets[drive.body]
-            case TorqueDrive():
-                found[f"{drive.name}_torque"] = drive.torque
-                if drive.by_speed is not None:
-                    found |= hinges(f"{drive.name}_by_speed", drive.by_speed)
-                if drive.no_load_speed is not None:
-                    found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
+            case _:
                 found[f"{drive.name}_speed"] = drive.initial_speed
+        if isinstance(drive, PlanarTorque):
+            known = drive.torque is not None and not drive.table
+            found[f"{drive.name}_torque"] = drive.torque if known else 1.0  # type: ignore[assignment]
+            for name, rows in drive.straight.items():
+                found |= hinges(name, rows)
+            if drive.no_load_speed is not None:
+                found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
     for load in trees.mechanism.loads:
         found |= load.numbers()
 

@@ -1,4 +1,4 @@
-"""What a planar mechanism is made of: bodies and joints, each a frozen record in SI units; `drives` has the rest.
+"""Bodies of a planar mechanism as frozen records in SI units, and what follows from the tables of its joints.
 
 A place is ``"body.point"``; the ground is the body ``ground``. Points and centres are given in the body's own axes,
 angles count counter-clockwise.
@@ -6,30 +6,22 @@ angles count counter-clockwise.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import CORNERS, WALLS
-from hpcclear.dynamics.contacts import pin_in_slot
+from hpcclear.dynamics.contacts import guide, pin_in_slot
 from hpcclear.dynamics.contacts.declared import ContactGeometry
-from hpcclear.dynamics.contacts.guide import corner, gap_of
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
+from hpcclear.scene.joints import PlanarSlot
+from hpcclear.scene.planar import BarBending, Loose, Pin, PlanarClearance, PlanarJoint, PlanarSlide
 
 GROUND = "ground"
 Pair = tuple[float, float]
 Number = float | Array
 """One number, or those of samples (m,)."""
-
-
-@dataclass(frozen=True)
-class Bending:
-    """Of a bar from its point a to b: how many modes, stiffness EI in N m2, damping ratio of each mode."""
-
-    modes: int
-    stiffness: float
-    damping: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ class Body:
     center: Pair = (0.0, 0.0)
     points: Mapping[str, Pair] = field(default_factory=dict)
     start_angle: float = 0.0
-    bending: Bending | None = None
+    bending: BarBending | None = None
 
 
 class Contact(NamedTuple):
@@ -57,7 +49,7 @@ class Contact(NamedTuple):
     """
 
     name: str
-    joint: "Joint"
+    joint: Loose
     journal: str
     bearing: str
     geometry: ContactGeometry
@@ -69,172 +61,56 @@ class Contact(NamedTuple):
         return self.name.replace(".", "_")
 
 
-@dataclass(frozen=True)
-class IdealFriction:
-    """Friction of a guide or pin over its reaction, sliding speed (m/s) below which it falls linearly to 0, and radius of the
-    pin (m), which makes torques of forces: 1 of a guide."""
-
-    coefficient: float
-    ramp_speed: float
-    radius: float = 1.0
-
-
-@dataclass(frozen=True)
-class Revolute:
-    """A pin without clearance between two places."""
-
-    name: str
-    journal: str
-    bearing: str
-    friction: IdealFriction | None = field(default=None, kw_only=True)
-
-    @property
-    def places(self) -> tuple[str, str]:
-        """Both places: journal, bearing."""
-        return self.journal, self.bearing
-
-
-@dataclass(frozen=True)
-class Clearance(Revolute):
-    """A journal that moves freely in a bearing larger than itself by the clearance, m."""
-
-    ideal: ClassVar[type] = Revolute
-
-    clearance: float = 0.0
-    bearing_radius: float = 0.0
-    stiffness: float = 0.0
-    start_eccentricity: Pair = (0.0, 0.0)
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """The one of its journal."""
-        pin = GEOMETRIES["pin_in_bearing"]
-        return (Contact(self.name, self, self.journal, self.bearing, pin),)
-
-    @property
-    def gaps(self) -> tuple[Number, ...]:
-        """Of its contacts at the start, m, below 0 in flight."""
-        return (np.hypot(*self.start_eccentricity) - self.clearance,)
-
-
-@dataclass(frozen=True)
-class Aligned:
-    """A body whose x axis keeps the direction of a line through a place of another body or of the ground.
-
-    `line` is that place, on the carrier; `angle` the line's direction in the carrier's axes, rad.
-    """
-
-    name: str
-    point: str
-    line: str
-    angle: float = 0.0
-
-    @property
-    def places(self) -> tuple[str, str]:
-        """Both places: of the body, of the one that carries the line."""
-        return self.point, self.line
-
-
-@dataclass(frozen=True)
-class Slide(Aligned):
-    """A guide: the point moves along the line."""
-
-    friction: IdealFriction | None = None
-
-
-@dataclass(frozen=True)
-class LooseSlide(Slide):
-    """A rectangular slider, its middle at the point, in a channel that is higher by twice the clearance; all in m.
-
-    Its x axis goes along the line but for tilt. At the start it is offset to the left of the line and tilted (rad).
-    """
-
-    ideal: ClassVar[type] = Slide
-
-    clearance: float = 0.0
-    length: float = 0.0
-    height: float = 0.0
-    corner_radius: float = 0.0
-    stiffness: float = 0.0
-    start_offset: float = 0.0
-    start_tilt: float = 0.0
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """One a corner, in the order of `CORNERS`."""
-        body, guide = split(self.point)[0], GEOMETRIES["guide"]
-        return tuple(
-            Contact(
-                f"{self.name}.{word}", self, f"{body}.{self.name}_{word}", self.line, guide, side
-            )
-            for word, (_, side) in CORNERS.items()
+def contacts_of(joint: Loose) -> tuple[Contact, ...]:
+    """The contacts of a joint with clearance: of a guide's corners, in the order of `CORNERS`, or a slot's `WALLS`."""
+    geometry = GEOMETRIES[joint.geometry]
+    if isinstance(joint, PlanarClearance):
+        return (Contact(joint.name, joint, joint.journal, joint.bearing, geometry),)
+    sides = {**WALLS, **{word: side for word, (_, side) in CORNERS.items()}}
+    corner_of = f"{split(joint.point)[0]}.{joint.name}_"
+    return tuple(
+        Contact(
+            f"{joint.name}.{word}", joint,
+            joint.point if isinstance(joint, PlanarSlot) else corner_of + word,
+            joint.line, geometry, sides[word],
         )
-
-    @property
-    def gaps(self) -> tuple[Number, ...]:
-        """Of its contacts at the start, m, below 0 in flight."""
-        return tuple(gap_of(self, word, self.start_offset, self.start_tilt) for word in CORNERS)
-
-    @property
-    def start_eccentricity(self) -> Pair:
-        """What the constraints of a guide without clearance are at the start: offset, sine of the tilt."""
-        return self.start_offset, np.sin(self.start_tilt)
-
-    def corners(self, middle: Pair) -> dict[str, Pair]:
-        """Points of the slider that are centres of its corners, `middle` its place in the slider's axes."""
-        size = self.length, self.height
-        return {
-            f"{self.name}_{word}": corner(middle, size, self.corner_radius, word)
-            for word in CORNERS
-        }
+        for word in joint.corners
+    )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Slot(Aligned):
-    """A pin in a slot: the point moves along the line, and its body turns freely."""
+def start_of(joint: Loose) -> tuple[Number, ...]:
+    """Of a joint with clearance at the start: the journal's eccentricity, m; the offset of a pin in a slot; offset and tilt,
+    rad, of a slider."""
+    if isinstance(joint, PlanarClearance):
+        return joint.start_eccentricity.x, joint.start_eccentricity.y
+    entries = ("start_offset",) if isinstance(joint, PlanarSlot) else ("start_offset", "start_tilt")
+    given = (getattr(joint, entry) for entry in entries)
+    return tuple(0.0 if one is None else one for one in given)
 
 
-@dataclass(frozen=True)
-class LooseSlot(Slot):
-    """A pin, its centre at the point, in a slot that is wider by twice the clearance; all in m.
-
-    At the start it is offset to the left of the line.
-    """
-
-    ideal: ClassVar[type] = Slot
-
-    clearance: float = 0.0
-    pin_radius: float = 0.0
-    stiffness: float = 0.0
-    start_offset: float = 0.0
-
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """One a wall, in the order of `WALLS`."""
-        slot = GEOMETRIES["pin_in_slot"]
-        return tuple(
-            Contact(f"{self.name}.{word}", self, self.point, self.line, slot, side)
-            for word, side in WALLS.items()
-        )
-
-    @property
-    def gaps(self) -> tuple[Number, ...]:
-        """Of its contacts at the start, m, below 0 in flight."""
-        return tuple(pin_in_slot.gap_of(self, word, self.start_offset) for word in WALLS)
-
-    @property
-    def start_eccentricity(self) -> tuple[float]:
-        """What the constraint of a slot without clearance is at the start: the offset."""
-        return (self.start_offset,)
+def gaps_of(joint: Loose) -> tuple[Number, ...]:
+    """Of its contacts at the start, m, below 0 in flight."""
+    if isinstance(joint, PlanarClearance):
+        start = joint.start_eccentricity
+        return (np.hypot(start.x, start.y) - joint.clearance,)
+    module = pin_in_slot if isinstance(joint, PlanarSlot) else guide
+    return tuple(module.gap_of(joint, word, *start_of(joint)) for word in joint.corners)
 
 
-@dataclass(frozen=True)
-class Fixed(Aligned):
-    """A body held on the ground: the point stays where the line begins."""
+def corners_of(joint: PlanarSlide, middle: Pair) -> dict[str, Pair]:
+    """Points of a slider that are centres of its corners, `middle` its place in the slider's axes."""
+    size = joint.length, joint.height
+    return {
+        f"{joint.name}_{word}": guide.corner(middle, size, joint.corner_radius, word)  # type: ignore[arg-type]
+        for word in CORNERS
+    }
 
 
-Joint = Revolute | Clearance | Slide | LooseSlide | Slot | LooseSlot | Fixed
-Loose = Clearance | LooseSlide | LooseSlot
+def places_of(joint: PlanarJoint) -> tuple[str, str]:
+    """Both places: journal and bearing, or that of the body and that of the one that carries the line."""
+    if isinstance(joint, Pin):
+        return joint.journal, joint.bearing
+    return joint.point, joint.line
 
 
 def split(place: str) -> tuple[str, str]:

@@ -13,8 +13,9 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Number, Slide
+from hpcclear.dynamics.linkage.parts import GROUND, Number
 from hpcclear.dynamics.linkage.trees import Forest
+from hpcclear.scene.planar import Aligned, PlanarSlide
 
 
 class Pose(NamedTuple):
@@ -144,7 +145,7 @@ def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tup
 def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Number]:
     """How far a body has come along its guide, m, and how fast it moves."""
     hang = forest.hangs[body]
-    assert isinstance(hang.joint, Slide)
+    assert isinstance(hang.joint, PlanarSlide)
     own, own_speed, _, _ = placed(assembly, hang.own)
     base, base_speed, _, _ = placed(assembly, hang.parent)
     _, _, angle, spin = placed(assembly, hang.joint.point)

@@ -15,13 +15,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, placed
-from hpcclear.dynamics.linkage.drives import seconds_of
 from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
@@ -100,7 +99,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
     mechanism = assembly.loops.mechanism
     main, loops = mechanism.period, Loops(mechanism, trees=True)
     start, _ = coordinates(loops.forest, assembly, mechanism)
-    found = walked(loops, start, main.seconds, getattr(main, "turns", 1), rounds)
+    found = walked(loops, start, main.seconds, main.turns, rounds)
     for change in found.changes:
         if freedom(mechanism) == 0 and _diverges(assembly, found, change, gravity):
             found.end(Status.NEAR_SINGULAR, change)
@@ -156,10 +155,10 @@ def why(assembly: Assembly, passage: Passage) -> str:
         body.name
         for body in mechanism.bodies
         if body.name not in driven
-        and sum(body.name in map(_body, joint.places) for joint in loaded) > 1
+        and sum(body.name in map(_body, places_of(joint)) for joint in loaded) > 1
     ]
-    between = [j for j in loaded if set(bodies) & set(map(_body, j.places))]
-    points = np.array([[(z := placed(pose, j.places[0])[0]).real, z.imag] for j in between])
+    between = [j for j in loaded if set(bodies) & set(map(_body, places_of(j)))]
+    points = np.array([[(z := placed(pose, places_of(j)[0])[0]).real, z.imag] for j in between])
     spread = np.linalg.svd(points - points.mean(axis=0))[1] if len(points) else np.ones(2)
     straight = len(spread) > 1 and spread[1] < 0.02 * spread[0]
     where = f"{angle_of(pose):.1f} deg of the {mechanism.period.body}"
@@ -277,7 +276,7 @@ def _reactions(
     for load in tabled:
         body = getattr(load, "angle_of", None) or mechanism.period.body
         turned = assembly.loops.forest.index("angle", body)  # every body turns by itself here
-        place = times if seconds_of(load) else work[turned]
+        place = times if load.seconds else work[turned]
         work[curves[load.name]] = tabulated.get(load.name, np.ones_like)(place)
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     on_arrays(mechanism, text.source, **text.functions)(None, (), work, par, 0, 1)

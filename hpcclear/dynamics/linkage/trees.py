@@ -11,9 +11,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
-from hpcclear.dynamics.linkage.drives import Drive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Joint, Revolute, Slide, Slot, split
+from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
+from hpcclear.scene.driving import PlanarDrive
+from hpcclear.scene.joints import PlanarSlot
+from hpcclear.scene.planar import Pin, PlanarFixed, PlanarJoint, PlanarRevolute, PlanarSlide
 
 
 class Coordinate(NamedTuple):
@@ -33,7 +35,7 @@ class Coordinate(NamedTuple):
 class Hang(NamedTuple):
     """How a body hangs in its tree: by a joint, from a place of its parent, at a place of its own; free without joint."""
 
-    joint: Joint | None
+    joint: PlanarJoint | None
     parent: str = ""
     own: str = ""
 
@@ -51,9 +53,9 @@ class Forest:
     """By how much each body is turned against its frame, rad."""
     coordinates: tuple[Coordinate, ...]
     """Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last."""
-    prescribed: dict[str, Drive]
+    prescribed: dict[str, PlanarDrive]
     """Drives by frame, where the angle is given."""
-    closures: tuple[Joint | Drive, ...]
+    closures: tuple[PlanarJoint | PlanarDrive, ...]
     """What is left as a constraint."""
     cartesian: bool = False
     """Whether every body is a tree by itself."""
@@ -76,7 +78,7 @@ class Forest:
         hang = self.hangs[body]
         if self.mechanism.body(body).bending is not None:
             return False
-        return isinstance(hang.joint, Revolute) and split(hang.parent)[0] == GROUND
+        return isinstance(hang.joint, Pin) and split(hang.parent)[0] == GROUND
 
 
 def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) -> Forest:
@@ -87,8 +89,8 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
     joints = list(mechanism.joints if closed else mechanism.ideal)
     edges, closures = ([], joints) if cartesian else _spanning(mechanism)
     if cartesian:
-        edges = [joint for joint in closures if isinstance(joint, Fixed)]
-        closures = [joint for joint in closures if not isinstance(joint, Fixed)]
+        edges = [joint for joint in closures if isinstance(joint, PlanarFixed)]
+        closures = [joint for joint in closures if not isinstance(joint, PlanarFixed)]
     hangs = _hung(mechanism, edges)
     frames, offsets = _frames(mechanism, hangs)
     prescribed = {frames[d.body]: d for d in mechanism.drives if d.prescribed and not cartesian}
@@ -99,17 +101,17 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
     )  # fmt: skip
 
 
-def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
+def _spanning(m: Mechanism) -> tuple[list[PlanarJoint], list[PlanarJoint]]:
     """Ideal joints of the trees, and those that close loops."""
     group = {name: name for name in (GROUND, *(body.name for body in m.bodies))}
-    edges: list[Joint] = []
-    closures: list[Joint] = []
-    order = {Fixed: 0, Slide: 1, Revolute: 2}
+    edges: list[PlanarJoint] = []
+    closures: list[PlanarJoint] = []
+    order = {PlanarFixed: 0, PlanarSlide: 1, PlanarRevolute: 2}
     for joint in sorted(m.ideal, key=lambda joint: order.get(type(joint), len(order))):
-        if isinstance(joint, Slot):  # nothing hangs by one constraint alone
+        if isinstance(joint, PlanarSlot):  # nothing hangs by one constraint alone
             closures.append(joint)
             continue
-        one, two = (group[split(place)[0]] for place in joint.places)
+        one, two = (group[split(place)[0]] for place in places_of(joint))
         if one == two:
             closures.append(joint)
             continue
@@ -118,7 +120,7 @@ def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
     return edges, closures
 
 
-def _hung(m: Mechanism, edges: list[Joint]) -> dict[str, Hang]:
+def _hung(m: Mechanism, edges: list[PlanarJoint]) -> dict[str, Hang]:
     """How each body hangs; the ground is the first root, then the first body of each tree without it."""
     hangs: dict[str, Hang] = {}
     for root in (GROUND, *(body.name for body in m.bodies)):
@@ -130,7 +132,7 @@ def _hung(m: Mechanism, edges: list[Joint]) -> dict[str, Hang]:
         while waiting:
             here = waiting.pop(0)
             for joint in edges:
-                first, second = joint.places
+                first, second = places_of(joint)
                 for own, parent in ((first, second), (second, first)):
                     body = split(own)[0]
                     if split(parent)[0] == here and body not in hangs and body != GROUND:
@@ -144,7 +146,7 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
     frames, offsets = {GROUND: GROUND}, {GROUND: 0.0}
     for body, hang in hangs.items():
         parent = split(hang.parent)[0]
-        if isinstance(hang.joint, (Slide, Fixed)):
+        if isinstance(hang.joint, (PlanarSlide, PlanarFixed)):
             turned = hang.joint.angle if hang.own == hang.joint.point else -hang.joint.angle
             frames[body], offsets[body] = frames[parent], offsets[parent] + turned
         else:
@@ -153,7 +155,7 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
 
 
 def _coordinates(
-    m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, Drive]
+    m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, PlanarDrive]
 ) -> tuple[Coordinate, ...]:
     found = [
         Coordinate(kind_of(mode), body.name)
@@ -167,7 +169,7 @@ def _coordinates(
             found += [Coordinate("x", body.name), Coordinate("y", body.name)]
         if frames[body.name] == body.name and body.name not in prescribed:
             found.append(Coordinate("angle", body.name))
-        if isinstance(joint, Slide):
+        if isinstance(joint, PlanarSlide):
             found.append(Coordinate("slide", body.name, joint.name))
     main = Coordinate("angle", frames[m.period.body])
     return (*(c for c in found if c != main), *(c for c in found if c == main))

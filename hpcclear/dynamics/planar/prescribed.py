@@ -10,12 +10,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import placed
-from hpcclear.dynamics.linkage.drives import TableDrive, seconds_of, straight_of
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Slide, split
+from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
@@ -24,7 +23,8 @@ from hpcclear.dynamics.planar.response import at_places, bodies_and_points, move
 from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.planar.turning import passage
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import turns_of
+from hpcclear.scene.driving import PlanarTable
+from hpcclear.scene.planar import PlanarSlide, turns_of
 from hpcclear.scene.points import Points
 
 BEND = 1e-6
@@ -80,13 +80,13 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
     """When, from the first to the last of the instants (t,), a table is at a row around which it bends, s, ascending."""
     found = [np.zeros(0)]
     for drive in mechanism.drives:
-        if isinstance(drive, TableDrive):
+        if isinstance(drive, PlanarTable):
             stops = breaks(drive.pieces[-1], BEND)
             found.append(_levels(stops, True, times / drive.seconds) * drive.seconds)
     curves = curves_of(scene.linkage, scene.numerics.interpolation)
     tabled = [load for load in mechanism.loads if load.name in curves]
-    by_time = {load.name for load in tabled if seconds_of(load)}
-    straight = [(load, rows) for load in mechanism.loads for rows in straight_of(load).values()]
+    by_time = {load.name for load in tabled if load.seconds}
+    straight = [(load, rows) for load in mechanism.loads for rows in load.straight.values()]
     by_place = straight or len(tabled) > len(by_time)
     coarse = prescribed_motion(mechanism, times) if by_place else None
     for load, rows in straight:
@@ -152,7 +152,9 @@ def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
     follow, mechanism = linkage.follow, held.assembly.loops.mechanism
     if not follow:
         return np.full(len(held.times), np.nan)
-    guides = [j for j in mechanism.joints if isinstance(j, Slide) and split(j.point)[0] == follow]
+    guides = [
+        j for j in mechanism.joints if isinstance(j, PlanarSlide) and split(j.point)[0] == follow
+    ]
     place = follow if "." in follow else guides[0].point
     pose = replace(held.assembly, q=held.q.T, v=held.v.T)
     here, _, _, spin = placed(pose, place)

@@ -11,17 +11,17 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
-from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
-from hpcclear.dynamics.linkage.parts import GROUND, Number, Slide, split
+from hpcclear.dynamics.linkage.parts import GROUND, Number, split
 from hpcclear.dynamics.linkage.rows import On
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import turns_of
+from hpcclear.scene.driving import PlanarSpeed
+from hpcclear.scene.planar import PlanarSlide, turns_of
 from hpcclear.scene.points import Numbers, Points
 
 PLACEHOLDER = 1e-3
@@ -115,7 +115,7 @@ def guided(mechanism: Mechanism) -> str:
     held = [
         split(joint.point)[0]
         for joint in mechanism.joints
-        if isinstance(joint, Slide) and split(joint.line)[0] == GROUND
+        if isinstance(joint, PlanarSlide) and split(joint.line)[0] == GROUND
     ]
     return next((body.name for body in mechanism.bodies if body.name in held), "")
 
@@ -136,8 +136,8 @@ def check_drives(mechanism: Mechanism) -> None:
 
 def check_inertias(m: Mechanism) -> None:
     """InputError where a body by itself would need an inertia that it does not have: its angle does not grow evenly."""
-    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m, (ConstantSpeed,))
-    found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
+    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m, (PlanarSpeed,))
+    found -= {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
     for body in m.bodies:
         if body.name in found:
             raise InputError(

@@ -11,21 +11,14 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Parameters, Rates
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    LooseSlide,
-    LooseSlot,
-    Number,
-    Revolute,
-    as_complex,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, Number, as_complex, places_of, split
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.energy import stored_energy
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import turns_of
+from hpcclear.scene.joints import OfContacts
+from hpcclear.scene.planar import PlanarRevolute, turns_of
 
 
 class ResponseStates(NamedTuple):
@@ -95,7 +88,7 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
 
 def pins_of(mechanism: Mechanism) -> tuple[str, ...]:
     """Names of the pins without clearance."""
-    return tuple(joint.name for joint in mechanism.joints if type(joint) is Revolute)
+    return tuple(joint.name for joint in mechanism.joints if isinstance(joint, PlanarRevolute))
 
 
 def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> list[str]:
@@ -189,12 +182,12 @@ def balance_series(
 
 def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
-    guides = [joint for joint in mechanism.clearances if isinstance(joint, (LooseSlide, LooseSlot))]
+    guides = [joint for joint in mechanism.clearances if isinstance(joint, OfContacts)]
     if not guides:
         return {}
     found = []
     for joint in guides:
-        (middle, angle), (line, turned) = (_place(mechanism, pose, one) for one in joint.places)
+        (middle, angle), (line, turned) = (_place(mechanism, pose, one) for one in places_of(joint))
         along = np.exp(1j * (turned + joint.angle))
         tilt = np.angle(np.exp(1j * angle) / along)
         found.append((((middle - line) * along.conjugate()).imag, tilt))

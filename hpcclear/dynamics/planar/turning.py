@@ -5,19 +5,19 @@ near singular where it hardly passes. With clearance a change point is for the d
 ideal joints alone depend on one another there.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
-from hpcclear.dynamics.linkage.drives import ConstantSpeed, TorqueDrive
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import Joint, Loose
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
 from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
+from hpcclear.scene.driving import FreeDriving, PlanarSpeed
+from hpcclear.scene.planar import Loose, PlanarClearance, PlanarJoint, PlanarRevolute, is_loose
 
 DEPENDENT = 1e-3
 """Smallest singular value of the ideal joints' constraints, rows scaled to 1, at which they depend on one another at a change
@@ -37,27 +37,33 @@ NEAR_CHANGE = 0.1
 
 def without_clearance(mechanism: Mechanism) -> Mechanism:
     """The mechanism with pins in place of clearances, and a drive of constant speed in place of a torque."""
+    entries = ("name", "body", "period", "turns")
     drives = tuple(
-        ConstantSpeed(d.name, d.body, d.usual_speed, d.period, d.turns)
-        if isinstance(d, TorqueDrive)
+        PlanarSpeed.model_construct(
+            kind="constant-speed", speed=d.usual_speed, **{one: getattr(d, one) for one in entries}
+        )
+        if isinstance(d, FreeDriving)
         else d
         for d in mechanism.drives
     )
     return replace(mechanism, joints=pinned(mechanism), drives=drives, loads=())
 
 
-def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
+def pinned(mechanism: Mechanism) -> tuple[PlanarJoint, ...]:
     """The joints of a mechanism, none with clearance."""
-    return tuple(
-        joint.ideal(*(getattr(joint, one.name) for one in fields(joint.ideal) if not one.kw_only))
-        if isinstance(joint, Loose)
-        else joint
-        for joint in mechanism.joints
+    return tuple(_ideal(joint) if is_loose(joint) else joint for joint in mechanism.joints)
+
+
+def _ideal(joint: Loose) -> PlanarJoint:
+    if not isinstance(joint, PlanarClearance):
+        return joint.model_copy(update={"clearance": None})
+    return PlanarRevolute.model_construct(
+        name=joint.name, kind="revolute", journal=joint.journal, bearing=joint.bearing
     )
 
 
 def _by_torque(mechanism: Mechanism) -> bool:
-    return any(isinstance(drive, TorqueDrive) for drive in mechanism.drives)
+    return not all(drive.prescribed for drive in mechanism.drives)
 
 
 def twin_of(mechanism: Mechanism) -> Mechanism | None:

@@ -7,7 +7,6 @@ from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.laws import in_lanes, rate_in_lanes
 from hpcclear.dynamics.layout.views import Parameters
-from hpcclear.dynamics.linkage.drives import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
@@ -18,6 +17,7 @@ from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, TSITOURAS, Tab
 from hpcclear.dynamics.stepping.implicit.control import STEEP
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
+from hpcclear.scene.driving import PlanarRunUp, PlanarTable
 
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
@@ -51,7 +51,7 @@ def effects_of(
         first=next(iter(scene.open_places), 0),
         contact=in_lanes(e.contact.declared) if e.contact is not None and count else None,
         friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
-        torque=_flag(isinstance(main, TorqueDrive) and bool(main.advance)),
+        torque=_flag(not main.prescribed and bool(main.advance)),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
@@ -103,7 +103,7 @@ def _curves_of_rows(scene: Scene, linkage: Linkage) -> tuple[Pieces, ...]:
     driven = {
         f"{drive.name}.{part}": pieces
         for drive in linkage.mechanism.drives
-        if isinstance(drive, (TableDrive, RunUp))
+        if isinstance(drive, (PlanarTable, PlanarRunUp))
         for part, pieces in zip(drive.curves, drive.pieces, strict=True)
     }
     tables = curves_of(scene.linkage, scene.numerics.interpolation)

@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS
 from hpcclear.report.figures import motion
-from hpcclear.report.figures.placed import Pose, centre_of
+from hpcclear.report.figures.placed import Pose
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 
@@ -42,7 +42,7 @@ def poses(scene: Scene, shown: Results, k: int) -> dict[str, Pose]:
         held = [one.isel(body=b) for b in range(shown.sizes["body"])]
         entries = ("body_x", "body_y", "body_angle")
         return {str(b["body"].item()): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
-    phi, crank = float(one["crank_angle"]), centre_of(scene.linkage.bodies[0])[0]
+    phi, crank = float(one["crank_angle"]), scene.linkage.bodies[0].own_center[0]
     aside, tilt = (
         float(one[name].to_numpy()[0]) if name in shown else 0.0
         for name in ("guide_offset", "guide_tilt")

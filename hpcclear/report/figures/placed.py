@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.scene.planar import Planar, PlanarBody
+from hpcclear.scene.planar import Planar
 
 Pose = tuple[float, float, float]
 """Of a body: its mass centre, m, and its angle, rad."""
@@ -23,8 +23,8 @@ class Placed:
             x, y, angle = poses[body.name]
             turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
             self.bodies[body.name] = {
-                name: np.array([x, y]) + turn @ (point - centre_of(body))
-                for name, point in points_of(body).items()
+                name: np.array([x, y]) + turn @ np.subtract(point, body.own_center)
+                for name, point in body.own_points.items()
             }
             self.angles[body.name] = angle
         self.ground = {
@@ -45,19 +45,3 @@ class Placed:
         """All points and corners about sliders, shape (points, 2)."""
         groups = [self.ground, *self.bodies.values()]
         return np.array([*(point for group in groups for point in group.values()), *self._sliders])
-
-
-def points_of(body: PlanarBody) -> dict[str, Array]:
-    """Points (2,) of a body in its own axes, m; those of a bar are a and b besides."""
-    found = {point.name: np.array([point.x, point.y]) for point in body.points}
-    if body.length is not None:
-        found = {"a": np.zeros(2), "b": np.array([body.length, 0.0])} | found
-    return found
-
-
-def centre_of(body: PlanarBody) -> Array:
-    """Its mass centre (2,) in its own axes, m."""
-    if body.length is None:
-        return np.array([body.center.x, body.center.y])
-    along = 0.5 * body.length if body.mass_center is None else body.mass_center
-    return np.array([along, 0.0])

@@ -31,6 +31,9 @@ class Load(Table):
 
     table: ClassVar[bool] = False
     """Whether its size follows a curve over an angle or the time."""
+    curves: ClassVar[tuple[str, ...]] = ()
+    seconds: ClassVar[float] = 0.0
+    """Length of its curve over the time, s; 0 where there is none."""
     by_angle: ClassVar[bool] = False
     """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
 
@@ -79,7 +82,7 @@ class SizedLoad(Load):
         return getattr(self, f"{self.size_entry}_by_time")
 
     @property
-    def seconds(self) -> float:
+    def seconds(self) -> float:  # type: ignore[override]
         """Length of its curve over the time, s; 0 where there is none."""
         return 0.0 if self.timed is None else float(self.timed[-1][0])
 
