@@ -82,7 +82,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
             "contribution": numbers(0.55, 0.3, 0.3, 0.001, np.nan),
             "contribution_error": numbers(0.01, 0.02, 0.02, 0.004, np.nan),
             "halved": numbers(0.25, 0.1, 0.02, 0.0, np.nan), "halved_error": numbers(0.01, 0.01, 0.005, 0.001, np.nan),
-            "unexplained": ("design", [0.15]), "together": ("input", [0, 1, 1, 0, 0]),
+            "unexplained": ("design", [0.15]), "group": numbers(0, 1, 1, 0, 0),
         },
         {"design": ["case alpha"], "input": ["C", "m2", "m3", "u2", "other"]},
     )  # fmt: skip

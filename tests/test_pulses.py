@@ -12,10 +12,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import kind_of
-from hpcclear.base.pieces import breaks, level, mean_of, periodic, spline
+from hpcclear.base.pieces import breaks, level, mean_of, periodic
 from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
 from hpcclear.dynamics.linkage.elements import enter_table, look_up
+from hpcclear.scene.driving import spline
 
 TURN = 2 * np.pi
 CRANK, ROD, INERTIA = 0.04, 0.145, 0.5

@@ -3,7 +3,6 @@
 The kernel, time series, drawings and means all read these pieces, so that a short pulse has the area that its rows give it.
 """
 
-from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -88,19 +87,6 @@ def level(rows: Rows, interpolation: str = "smooth") -> Pieces:
         x = np.concatenate([[0.0], x])
         cubics = np.concatenate([[[y[0], 0.0, 0.0, 0.0]], cubics])
     return Pieces(x, cubics, length, repeats=False)
-
-
-@lru_cache(maxsize=16)
-def spline(rows: Rows) -> Pieces:
-    """A periodic cubic spline through a table whose places begin at 0, but for what it gains evenly; not to be written to."""
-    from scipy.interpolate import CubicSpline  # a third of a second, for this alone
-
-    x, y = np.array(rows).T
-    rest = y - (y[-1] - y[0]) * x / x[-1]
-    rest[-1] = rest[0]
-    length = float(x[-1])
-    smooth = CubicSpline(x, rest, bc_type="periodic")
-    return Pieces(x[:-1] / length, smooth.c[::-1].T * length ** np.arange(4), length)
 
 
 def mean_of(rows: Rows, length: float, interpolation: str = "smooth") -> float:

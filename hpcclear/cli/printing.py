@@ -7,13 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich import box
-from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import WIDTH, detailed
-from hpcclear.cli.tables import console
+from hpcclear.cli.tables import console, table
 from hpcclear.cli.terminal import fitting
 from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html.content import Content
@@ -114,8 +112,8 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
         yield from (Text(line, "bold red") for line in _wrapped(f"Indicative only: {first.doubt}"))
     yield from map(Text, _wrapped("; ".join(filter(None, first.about))))
     yield Text("")
-    for table in replace(first, rows=first.rows[:rows]).tables():
-        yield from _columns(table)
+    for shown in replace(first, rows=first.rows[:rows]).tables():
+        yield from _columns(shown)
     if rows < len(first.rows):
         yield Text(f"and {len(first.rows) - rows} more")
     yield Text("")
@@ -169,14 +167,9 @@ def _print(out: Any, part: object) -> None:
         if "text" in part:
             out.print(part["text"], soft_wrap=True)
     else:
-        made = Table(title=part.caption, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)  # type: ignore[attr-defined]
-        for head in part.header:  # type: ignore[attr-defined]
-            made.add_column(fitting(str(head)), overflow="fold")
-        for row in part.rows:  # type: ignore[attr-defined]
-            made.add_row(
-                *(
-                    fitting(str(cell["words"] if isinstance(cell, Mapping) else cell))
-                    for cell in row
-                )
-            )
-        out.print(made)
+        whole: Any = part
+        rows = (
+            [fitting(str(cell["words"] if isinstance(cell, Mapping) else cell)) for cell in row]
+            for row in whole.rows
+        )
+        out.print(table(whole.caption, rows, [fitting(str(head)) for head in whole.header]))

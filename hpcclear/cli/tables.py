@@ -1,5 +1,6 @@
 """Tables and lines on the terminal by rich, plain when piped; its import takes a tenth of a second."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich import box
@@ -26,13 +27,13 @@ def console() -> Console:
     return _PlainConsole(highlight=False, width=width)
 
 
-def table(title: str, rows: list[tuple[str, str]]) -> Table:
-    """Two columns: what, and its value."""
+def table(title: str, rows: Iterable[Iterable[str]], header: Sequence[str] = ()) -> Table:
+    """Columns below their headings, as wide as the terminal allows; without these two: what, and its value."""
     made = Table(
-        title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=False, pad_edge=False
-    )
-    made.add_column(no_wrap=True)
-    made.add_column(overflow="fold")
+        title=title or None, title_justify="left", box=box.SIMPLE_HEAD, show_header=bool(header), pad_edge=False
+    )  # fmt: skip
+    for k, head in enumerate(header or ("", "")):
+        made.add_column(head, overflow="fold", no_wrap=not (header or k))
     for row in rows:
         made.add_row(*row)
     return made

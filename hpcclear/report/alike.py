@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results, Variable, each
 
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
@@ -64,7 +64,7 @@ def others(ours: Results, best: Results) -> list[str]:
         return []
     same = [
         *again(ours, best),
-        *(str(one["design"].item()) for one in _each(ours) if not satisfies(one)),
+        *(str(one["design"].item()) for one in each(ours, "design") if not satisfies(one)),
     ]
     return [name for name in _twins(ours, best) if name not in same]
 
@@ -72,10 +72,6 @@ def others(ours: Results, best: Results) -> list[str]:
 def satisfies(one: Results) -> bool:
     """Return whether a design significantly satisfies all constraints of its case."""
     return verdict_of(one) in (None, Verdict.HOLDS)
-
-
-def _each(ours: Results) -> list[Results]:
-    return [ours.isel(design=k) for k in range(ours.sizes["design"])]
 
 
 def _listed(names: list[str]) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike
 from hpcclear.report.merit import counts, recommended
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 
 LIGHTER = 0.01
 """Relative difference of the varied masses above which another design is called the lightest."""
@@ -85,10 +85,8 @@ def _lightest(verified: Results, case: str, chosen: list[str]) -> str:
     """The design of a case with the lowest sum of masses within its constraints; "" if one of the chosen is as light."""
     own = [
         one
-        for k in range(verified.sizes["design"])
-        if counts(one := verified.isel(design=k))
-        and str(one["design"].item()).startswith(f"{case} ")
-        and alike.satisfies(one)
+        for one in each(verified, "design")
+        if counts(one) and str(one["design"].item()).startswith(f"{case} ") and alike.satisfies(one)
     ]
     weights = {str(one["design"].item()): sum(map(float, alike.masses(one))) for one in own}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}

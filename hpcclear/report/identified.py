@@ -52,12 +52,7 @@ def _records(content: Results) -> list[Line]:
 
 
 def _calibration(content: Results, record: int) -> str:
-    share, factor = (
-        np.broadcast_to(content[name].to_numpy(), content["interval"].shape[:2])[
-            record
-        ]  # one row in older files
-        for name in ("coverage", "widening")
-    )
+    share, factor = (content[name].to_numpy()[record] for name in ("coverage", "widening"))
     shown = " and ".join(f"{one:.0%}" for one in share)
     wider = " and ".join(f"{one:.2g}" for one in factor)
     return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"

@@ -52,7 +52,7 @@ def shares(own: Results) -> list[tuple[str, float, float]]:
     """Return the random inputs of a design (of kind ``contributions``) with their shares of the variance and half-widths, the
     largest first; correlated inputs have one together."""
     names, values, errors, rows = _inputs(own, "contribution")
-    groups = (own["group"] if "group" in own else own["together"]).to_numpy()[rows]
+    groups = own["group"].to_numpy()[rows]
     parts = []
     for k, group in enumerate(groups.tolist()):
         its = np.flatnonzero(groups == group) if group > 0 else [k]

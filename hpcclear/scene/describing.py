@@ -279,8 +279,6 @@ def warnings(scene: SceneTables) -> Iterator[str]:
 def unused(scene: SceneTables) -> Iterator[str]:
     """What a study states and nothing of it reads."""
     study = scene.study
-    if study is not None and study.surrogate.of is not None:
-        yield "study.surrogate.of is not used any more: there is one search"
     if study is not None and study.accuracy is not None and study.verification.draws is not None:
         yield "study.accuracy is not used: study.verification names how many draws a design gets"
     if study is None or study.groups or study.sensitivity.groups == ():

@@ -1,11 +1,13 @@
 """What moves a mechanism: drives of bodies."""
 
 import math
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
-from hpcclear.base.pieces import Pieces, Rows, level, periodic, spline
+from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
 from hpcclear.scene.fields import (
     Angle,
@@ -30,6 +32,19 @@ def speed_entry(drive: "CrankSpeed | CrankTorque") -> str:
     if isinstance(drive, CrankSpeed):
         return "speed"
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
+
+
+@lru_cache(maxsize=16)
+def spline(rows: Rows) -> Pieces:
+    """A periodic cubic spline through a table whose places begin at 0, but for what it gains evenly; not to be written to."""
+    from scipy.interpolate import CubicSpline  # a third of a second, for this alone
+
+    x, y = np.array(rows).T
+    rest = y - (y[-1] - y[0]) * x / x[-1]
+    rest[-1] = rest[0]
+    length = float(x[-1])
+    smooth = CubicSpline(x, rest, bc_type="periodic")
+    return Pieces(x[:-1] / length, smooth.c[::-1].T * length ** np.arange(4), length)
 
 
 class Driving(Table):

@@ -254,7 +254,7 @@ Loose = PlanarClearance | PlanarSlide | PlanarSlot
 PlanarJoint = Annotated[Pin | Aligned, Field(discriminator="kind")]
 
 
-def is_loose(joint: PlanarJoint) -> TypeGuard[Loose]:
+def is_loose(joint: object) -> TypeGuard[Loose]:
     """Whether a joint has clearance."""
     return getattr(joint, "clearance", None) is not None
 

@@ -96,8 +96,6 @@ class Surrogate(Table):
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None
     """Covariance function: "squared-exponential", the default, for smooth f; or "matern-5/2", twice differentiable, for f with
     kinks. With the latter the swarm averages over 256 points of a Sobol sequence."""
-    of: Literal["f", "statistics"] | None = None
-    """Not used: the search by simulation always uses models of each objective and constraint over the designs."""
 
 
 class CertificateOfEffects(Table):

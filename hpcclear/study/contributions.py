@@ -105,5 +105,4 @@ def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
     if np.isfinite(found["halving_cost"]).any():
         data["halving_cost"] = found["halving_cost"]
     data["group"] = np.nan_to_num(found["group"]).astype(np.int64)
-    data["together"] = np.array((data["group"] > 0).any(axis=0), np.int8)
     run.write(dataset.dataset("contributions", coords, data, objective=run.scene.objective))

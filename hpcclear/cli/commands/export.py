@@ -43,6 +43,8 @@ def run(
 
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
+    from hpcclear.cli.tables import console
+    from hpcclear.cli.tables import table as tabled
     from hpcclear.report import export as writing
     from hpcclear.report.spread import rows_of, side_by_side
 
@@ -51,7 +53,7 @@ def run(
         samples = writing.read_samples(files)
         lines = side_by_side(samples, beyond)
         table = writing.statistics(samples, cli.place_of(output), lines, units)
-        _print_rows(["statistic", *samples], rows_of(lines))
+        console().print(tabled("", rows_of(lines), ["statistic", *samples]))
     else:
         _check_one(files, beyond)
         table = writing.export(files[0], cli.place_of(output), units)
@@ -69,18 +71,3 @@ def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
         raise InputError(
             "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
         )
-
-
-def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
-    """Print a table of texts, its columns as wide as the terminal allows."""
-    from rich import box
-    from rich.table import Table
-
-    from hpcclear.cli.tables import console
-
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in headings:
-        made.add_column(heading, overflow="fold")
-    for row in rows:
-        made.add_row(*row)
-    console().print(made)

@@ -22,7 +22,6 @@ from hpcclear.dynamics.linkage.parts import (
     start_of,
 )
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.scene.planar import PlanarFixed, PlanarSlide
 
 MOST_STEPS = 40
 MOST_TRIES = 12
@@ -188,7 +187,7 @@ def _eccentricities(loops: Loops) -> Array:
     for joint in loops.mechanism.clearances:
         rows = [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
         start = start_of(joint)
-        if isinstance(joint, PlanarSlide):
+        if joint.kind == "slide":
             start = start[0], np.sin(start[1])
         for r, apart in zip(rows, start, strict=True):
             wanted[r] = apart
@@ -198,9 +197,7 @@ def _eccentricities(loops: Loops) -> Array:
 def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
     """From rough angles; where these lead into a corner, from angles near them, further and further off."""
     rng = np.random.default_rng(0)  # the same tries for the same mechanism
-    guided = {
-        split(joint.point)[0] for joint in loops.mechanism.joints if isinstance(joint, PlanarSlide)
-    }
+    guided = {split(joint.point)[0] for joint in loops.mechanism.joints if joint.kind == "slide"}
     angles = np.array(
         [one.kind == "angle" and one.body not in guided for one in loops.forest.coordinates], float
     )
@@ -278,7 +275,7 @@ def rough_pose(loops: Loops) -> Array:
                 if body in placed or carrier not in placed:
                     continue
                 angle: Number = bodies[body].start_angle
-                if isinstance(joint, (PlanarSlide, PlanarFixed)):
+                if joint.kind in ("slide", "fixed"):
                     turned = joint.angle if own == joint.point else -joint.angle
                     angle = placed[carrier][1] + turned
                 turn = np.exp(1j * np.asarray(angle))

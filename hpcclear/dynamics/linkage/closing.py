@@ -9,10 +9,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
-from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
-from hpcclear.scene.driving import PlanarDrive, PlanarRunUp, PlanarSpeed
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.planar import Aligned, Pin, PlanarFixed, PlanarJoint, PlanarSlide
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, Part, places_of, split
 
 
 class ClosureRow(NamedTuple):
@@ -37,15 +34,15 @@ class Closing:
     kinematics: Kinematics
     writer: Writer
 
-    def rows(self, one: PlanarJoint | PlanarDrive) -> list[ClosureRow]:
+    def rows(self, one: Part) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
-        if isinstance(one, Pin):
+        if one.kind in PINS:
             return self._pin(one)
-        if isinstance(one, PlanarSlide):
+        if one.kind == "slide":
             return self._guide(one)
-        if isinstance(one, PlanarSlot):
+        if one.kind == "slot":
             return self._guide(one)[:1]
-        assert not isinstance(one, PlanarFixed)
+        assert one.kind != "fixed"
         return [self._driven(one)]
 
     def _row(
@@ -66,7 +63,7 @@ class Closing:
         asked = asked - alpha2 * rate - beta2 * error
         return ClosureRow(name, free, asked, others, error, rate)
 
-    def _pin(self, joint: Pin) -> list[ClosureRow]:
+    def _pin(self, joint: Joint) -> list[ClosureRow]:
         kin = self.kinematics
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
         error = kin.position(journal) - kin.position(bearing)
@@ -110,7 +107,7 @@ class Closing:
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
-    def _guide(self, joint: PlanarSlide | PlanarSlot) -> list[ClosureRow]:
+    def _guide(self, joint: Joint) -> list[ClosureRow]:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
@@ -143,7 +140,7 @@ class Closing:
             f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted
         )]  # fmt: skip
 
-    def sliding(self, joint: PlanarSlide) -> tuple[dict[Mover, Term], Term]:
+    def sliding(self, joint: Joint) -> tuple[dict[Mover, Term], Term]:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
         kin, along = self.kinematics, self.direction(joint)
         normal = along.across()
@@ -159,7 +156,7 @@ class Closing:
             f"v_{joint.name}", speed
         )
 
-    def direction(self, joint: Aligned) -> Vector:
+    def direction(self, joint: Joint) -> Vector:
         """Unit vector of a guide's line, along the ground's axes."""
         carrier = split(joint.line)[0]
         forest, write = self.kinematics.forest, self.writer
@@ -171,18 +168,18 @@ class Closing:
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
 
-    def run_up(self, drive: PlanarRunUp, speed: Term, rise: Term) -> ClosureRow:
+    def run_up(self, drive: Drive, speed: Term, rise: Term) -> ClosureRow:
         """A free body's acceleration as its drive has it; what its speed is off by is fed back."""
         own = self.kinematics.forest.frames[drive.body]
         rate = self.kinematics.spin(own) - speed
         return self._row(f"{drive.name}_angle", {Mover("angle", own): ONE}, -rise, rate, ZERO)
 
-    def _driven(self, drive: PlanarDrive) -> ClosureRow:
+    def _driven(self, drive: Drive) -> ClosureRow:
         kin, name = self.kinematics, f"{drive.name}_drive"
         angle, spin, turn = kin.driven(drive, name)
         own = kin.forest.frames[drive.body]
         error = named(f"angle_{own}") - angle
-        if isinstance(drive, PlanarSpeed) and drive is not kin.forest.mechanism.period:
+        if drive.kind == "constant-speed" and drive is not kin.forest.mechanism.period:
             # its angle does not restart with the period
             apart = self.writer.let(f"apart_{drive.name}", error)
             names = (f"s_{name}", f"c_{name}")

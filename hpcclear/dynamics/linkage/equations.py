@@ -11,12 +11,10 @@ from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Contact, split
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Contact, Drive, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.scene.driving import PlanarTorque
-from hpcclear.scene.planar import Aligned, Pin
 
 RESERVED = (
     *keyword.kwlist, "effects", "joints", "work", "par", "i", "W", "at", "abs", "np", "sincos", "saturated", *functions(),
@@ -86,7 +84,7 @@ class MotionEquations:
         angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
         if contact.geometry.along_a_line:
-            assert isinstance(contact.joint, Aligned)
+            assert contact.joint.kind not in PINS
             across = self.closing.direction(contact.joint).across()
             found = [*(across if contact.side > 0.0 else -across)]
             return f"({', '.join(self.writer.text(term) for term in found)})"
@@ -104,7 +102,7 @@ class MotionEquations:
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 
-    def torque(self, drive: PlanarTorque) -> tuple[Mover, Term]:
+    def torque(self, drive: Drive) -> tuple[Mover, Term]:
         """What a drive exerts, and along which column."""
         write = self.writer
         for name, rows in drive.straight.items():
@@ -206,7 +204,7 @@ class MotionEquations:
         n = len(self.columns)
         pins: dict[str, tuple[str, str]] = {}
         for one in self.forest.closures:
-            if isinstance(one, Pin):
+            if one.kind in PINS:
                 names = (f"{one.name}_x", f"{one.name}_y")
                 pins |= dict.fromkeys(names, names)
         numbers = {row.name: r for r, row in enumerate(self.constraints, n)}

@@ -16,12 +16,10 @@ from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import split
+from hpcclear.dynamics.linkage.parts import Drive, Joint, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingPin
 from hpcclear.dynamics.linkage.trees import Forest
-from hpcclear.scene.driving import PlanarDrive, PlanarFree, PlanarRunUp, PlanarTorque
-from hpcclear.scene.planar import PlanarRevolute, PlanarSlide
 
 
 @dataclass(frozen=True)
@@ -78,10 +76,10 @@ class _Generator(MotionEquations):
             )  # fmt: skip
             self.load_power = self.load_power + load.act(acting)
         drives = self.mechanism.drives
-        torques = [self.torque(drive) for drive in drives if isinstance(drive, PlanarTorque)]
+        torques = [self.torque(drive) for drive in drives if drive.kind == "torque"]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
         for drive in drives:
-            if isinstance(drive, PlanarRunUp):
+            if drive.kind == "run-up":
                 given = (self.turned(f"{drive.name}.{part}") for part in drive.curves)
                 self.constraints.append(self.closing.run_up(drive, *given))
         found = self.solved(torques)
@@ -157,9 +155,7 @@ class _Generator(MotionEquations):
 
     def _pins(self, found: dict[int, Term]) -> None:
         """Forces of the ideal pins on their journals' bodies."""
-        for k, joint in enumerate(
-            j for j in self.mechanism.joints if isinstance(j, PlanarRevolute)
-        ):
+        for k, joint in enumerate(j for j in self.mechanism.joints if j.kind == "revolute"):
             pin = RubbingPin(joint, self)
             on_bearing = pin.body is not None and pin.body != split(joint.journal)[0]
             for axis, part in enumerate(pin.pushes(found)):
@@ -217,7 +213,7 @@ class _Generator(MotionEquations):
             if (k := self.number.get(Mover("slide", follow))) is not None:
                 along = found[k]
             else:
-                guide = _guide_of(self.mechanism, follow)
+                guide = guide_of(self.mechanism, follow)
                 moved = kin.acceleration(kin.point(guide.point), second)
                 along = self.writer.let("followed", dot(moved, self.closing.direction(guide)))
             self._rate(at.FOLLOWED_ACCELERATION, along)
@@ -232,15 +228,13 @@ class _Generator(MotionEquations):
         self._rate(at.FOLLOWED_ACROSS, y)
         self._rate(at.FOLLOWED_SQUARE, x * x + y * y)
 
-    def _drives(self) -> list[PlanarDrive]:
+    def _drives(self) -> list[Drive]:
         main = self.mechanism.period
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
-    def _moment(
-        self, drive: PlanarDrive, found: dict[int, Term], torques: dict[Mover, Term]
-    ) -> Term:
+    def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Mover, Term]) -> Term:
         """Moment of a drive: what is given, or what the prescribed angle requires."""
-        if isinstance(drive, PlanarFree):
+        if drive.kind == "free":
             return ZERO
         column = Mover("angle", self.forest.frames[drive.body])
         if column in torques:
@@ -255,7 +249,7 @@ class _Generator(MotionEquations):
         self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
 
 
-def _guide_of(mechanism: Mechanism, body: str) -> PlanarSlide:
+def guide_of(mechanism: Mechanism, body: str) -> Joint:
     """The guide that a body's place moves along."""
-    guides = [joint for joint in mechanism.joints if isinstance(joint, PlanarSlide)]
+    guides = [joint for joint in mechanism.joints if joint.kind == "slide"]
     return next(joint for joint in guides if split(joint.point)[0] == body)

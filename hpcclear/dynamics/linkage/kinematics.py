@@ -10,10 +10,8 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import Bend
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.linkage.parts import GROUND, Drive, split
 from hpcclear.dynamics.linkage.trees import Forest
-from hpcclear.scene.driving import FreeDriving, PlanarHarmonic, PlanarSpeed, PlanarTable
-from hpcclear.scene.planar import PlanarSlide
 
 CENTER = "center"
 
@@ -92,11 +90,11 @@ class Kinematics:
         names = (f"s_{frame}", f"c_{frame}")
         self.writer.when_needed(names, f"{', '.join(names)} = sincos(angle_{frame})", (angle,))
 
-    def driven(self, drive: object, frame: str) -> tuple[Term, Term, Term]:
+    def driven(self, drive: Drive, frame: str) -> tuple[Term, Term, Term]:
         """Angle, angular velocity and acceleration that a drive prescribes."""
         write, name = self.writer, f"angle_{frame}"
         time = named("time")
-        if isinstance(drive, (PlanarSpeed, FreeDriving)):  # the latter where it starts
+        if drive.kind not in ("harmonic", "table"):  # the latter where it starts
             speed = write.parameter(f"{drive.name}_speed")
             start = self.forest.mechanism.body(drive.body).start_angle
             start = start - self.forest.offsets[drive.body]
@@ -107,9 +105,9 @@ class Kinematics:
                 text, needs = f"{frame}_start + {text}", (started, speed, time)
             write.when_needed((name,), f"{name} = {text}", needs)
             return named(name), speed, ZERO
-        if isinstance(drive, PlanarTable):
+        if drive.kind == "table":
             return self._tabulated(drive, frame)
-        assert isinstance(drive, PlanarHarmonic)
+        assert drive.kind == "harmonic"
         spin, acceleration, phase = f"spin_{frame}", f"turn_{frame}", f"phase_{frame}"
         mean, amplitude, rate, shift = (
             write.parameter(f"{drive.name}_{entry}")
@@ -123,7 +121,7 @@ class Kinematics:
         write.when_needed((name, spin, acceleration), line, needs)
         return named(name), named(spin), named(acceleration)
 
-    def _tabulated(self, drive: PlanarTable, frame: str) -> tuple[Term, Term, Term]:
+    def _tabulated(self, drive: Drive, frame: str) -> tuple[Term, Term, Term]:
         write, time = self.writer, named("time")
         parts = [f"{part}_{drive.name}" for part in ("given_angle", "given_spin", "given_turn")]
         rows = [self._curves.get(f"{drive.name}.{part}") for part in ("angle", "spin", "turn")]
@@ -245,7 +243,7 @@ class Kinematics:
             root = Point({GROUND: Vector(named(f"x_{body}"), named(f"y_{body}"))}, moves)
             return self._reached(root, frame, body, (CENTER, point))
         parent = self.point(hang.parent)
-        if isinstance(hang.joint, PlanarSlide):
+        if hang.joint.kind == "slide":
             along = self.offset(split(hang.joint.point)[0])
             if hang.own != hang.joint.point:
                 along = -along

@@ -20,7 +20,6 @@ from hpcclear.dynamics.linkage.piecewise import starts
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
-from hpcclear.scene.planar import PlanarRevolute
 
 
 class Linkage:
@@ -69,7 +68,7 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
-        count = sum(isinstance(joint, PlanarRevolute) for joint in mechanism.joints)
+        count = sum(joint.kind == "revolute" for joint in mechanism.joints)
         if count > at.MAX_PINS:
             raise InputError(
                 "mechanism.joints", count, f"more than {at.MAX_PINS} pins without clearance", "Use fewer bodies"

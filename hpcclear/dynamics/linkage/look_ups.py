@@ -5,15 +5,14 @@ from typing import NamedTuple
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.expression import Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics
+from hpcclear.dynamics.linkage.parts import Part
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest
-from hpcclear.scene.driving import PlanarDrive, PlanarRunUp, PlanarTable
-from hpcclear.scene.loads.declared import Load
 
 CLOCK = f"(work[{at.BEGAN} * W + i] + work[{at.STAGE_TIME} * W + i])"
 
 
-def curves_of(part: PlanarDrive | Load) -> list[str]:
+def curves_of(part: Part) -> list[str]:
     """Names of the tabulated curves that a drive or load has."""
     return [f"{part.name}.{one}" for one in part.curves] or [part.name] * part.table
 
@@ -47,15 +46,15 @@ class LookUps:
             name: self._of(one) for one in (*m.drives, *m.loads) for name in curves_of(one)
         }
 
-    def _of(self, part: PlanarDrive | Load) -> LookUp:
+    def _of(self, part: Part) -> LookUp:
         main = self._forest.mechanism.period
-        if isinstance(part, PlanarTable):
+        if part.kind == "table":
             share = main.seconds / part.seconds / main.turns / at.TURN
             rate = f"par[{at.SPEED} * W + i] * {share!r}"
             return LookUp((), f"{rate} * work[{at.STAGE_TIME} * W + i]", rate)
-        if isinstance(part, PlanarRunUp):
+        if part.kind == "run-up":
             return _by_time(part.speed_by_time[-1][0])
-        if isinstance(part, Load) and part.seconds:
+        if not hasattr(part, "prescribed") and part.seconds:
             return _by_time(part.seconds)
         if (body := getattr(part, "angle_of", None)) is not None:
             return self._by_angle(body, 1)

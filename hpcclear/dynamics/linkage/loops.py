@@ -18,9 +18,8 @@ from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Number
+from hpcclear.dynamics.linkage.parts import KINDS, Number
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.scene.driving import Driving, PlanarTable
 
 
 def sincos(angle: Array) -> tuple[Array, Array]:
@@ -73,7 +72,7 @@ def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, .
     return {
         f"table_of_{drive.name}": partial(_all_at, drive.pieces)
         for drive in mechanism.drives
-        if isinstance(drive, PlanarTable)
+        if drive.kind == "table"
     }
 
 
@@ -116,7 +115,7 @@ class Loops:
         texts: list[str] = []
         places: list[tuple[int, int]] = []
         for one in self.forest.closures:
-            table = "drives" if isinstance(one, Driving) else "joints"
+            table = "joints" if one.kind in KINDS else "drives"
             for row in closing.rows(one):
                 r = len(owners)
                 owners.append(f"{table}.{one.name}")

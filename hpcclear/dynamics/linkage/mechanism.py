@@ -9,25 +9,17 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    PINS,
     Body,
     Contact,
+    Drive,
+    Joint,
+    LoadTerms,
     Pair,
     contacts_of,
+    is_loose,
     places_of,
     split,
-)
-from hpcclear.scene import driving
-from hpcclear.scene.driving import PlanarDrive
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.loads.declared import Load
-from hpcclear.scene.planar import (
-    Loose,
-    Pin,
-    PlanarFixed,
-    PlanarJoint,
-    PlanarRevolute,
-    PlanarSlide,
-    is_loose,
 )
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -44,10 +36,10 @@ class Mechanism:
     """
 
     bodies: tuple[Body, ...]
-    joints: tuple[PlanarJoint, ...]
-    drives: tuple[PlanarDrive, ...]
+    joints: tuple[Joint, ...]
+    drives: tuple[Drive, ...]
     ground: Mapping[str, Pair] = field(default_factory=lambda: {"o": (0.0, 0.0)})
-    loads: tuple[Load, ...] = ()
+    loads: tuple[LoadTerms, ...] = ()
 
     def __post_init__(self) -> None:
         for check in (_names, _places, _numbers, _connected, _drives, _sizes):
@@ -63,7 +55,7 @@ class Mechanism:
         return self.ground[point] if name == GROUND else self.body(name).points[point]
 
     @property
-    def clearances(self) -> tuple[Loose, ...]:
+    def clearances(self) -> tuple[Joint, ...]:
         """The joints with clearance, in file order."""
         return tuple(joint for joint in self.joints if is_loose(joint))
 
@@ -73,29 +65,27 @@ class Mechanism:
         return tuple(contact for joint in self.clearances for contact in contacts_of(joint))
 
     @property
-    def ideal(self) -> tuple[PlanarJoint, ...]:
+    def ideal(self) -> tuple[Joint, ...]:
         """The joints without."""
         return tuple(joint for joint in self.joints if not is_loose(joint))
 
     @property
-    def period(self) -> PlanarDrive:
+    def period(self) -> Drive:
         """The drive whose turn is the revolution."""
         return next((drive for drive in self.drives if drive.period), self.drives[0])
 
     @property
     def free(self) -> bool:
         """Whether torques alone drive it."""
-        return all(
-            isinstance(drive, (driving.PlanarTorque, driving.PlanarFree)) for drive in self.drives
-        )
+        return all(drive.kind in ("torque", "free") for drive in self.drives)
 
     @property
     def clocked(self) -> bool:
         """Whether a load or drive goes by the time since the start."""
-        by_drive = any(isinstance(drive, driving.PlanarRunUp) for drive in self.drives)
+        by_drive = any(drive.kind == "run-up" for drive in self.drives)
         return by_drive or any(load.seconds for load in self.loads)
 
-    def drive_of(self, body: str) -> PlanarDrive | None:
+    def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
         return next((drive for drive in self.drives if drive.body == body), None)
 
@@ -127,14 +117,14 @@ def modes_of(mechanism: Mechanism) -> int:
     return sum(body.bending.modes for body in mechanism.bodies if body.bending is not None)
 
 
-def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
+def joined(mechanism: Mechanism, kinds: tuple[str, ...] = ()) -> list[set[str]]:
     """Which bodies hang together by joints of some kinds: sets of names, the ground's first.
 
     Guides with clearance, which let their sliders turn, have no kind of their own.
     """
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
-    for joint in mechanism.joints if kinds is object else mechanism.ideal:
-        if isinstance(joint, kinds):
+    for joint in mechanism.ideal if kinds else mechanism.joints:
+        if not kinds or joint.kind in kinds:
             groups = _merged(groups, {split(place)[0] for place in places_of(joint)})
     return sorted(groups, key=lambda group: GROUND not in group)
 
@@ -196,12 +186,12 @@ def _places(m: Mechanism) -> None:
             raise InputError(
                 f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
             )
-        if isinstance(joint, PlanarFixed) and second != GROUND:
+        if joint.kind == "fixed" and second != GROUND:
             raise InputError(
                 f"joints.{joint.name}.line", joint.line, "a body can be fixed to the ground only",
                 "Name a point of the ground, or make one body of the two",
             )  # fmt: skip
-        if isinstance(joint, PlanarSlide) and first == GROUND:
+        if joint.kind == "slide" and first == GROUND:
             raise InputError(
                 f"joints.{joint.name}.point", joint.point, "the ground cannot be the sliding body",
                 "Swap point and line",
@@ -210,14 +200,14 @@ def _places(m: Mechanism) -> None:
 
 def coupled(m: Mechanism) -> list[set[str]]:
     """Bodies whose angles the joints or loads compare with one another, the ground's first: sets of names."""
-    groups = joined(m, (PlanarSlide, PlanarFixed))
+    groups = joined(m, ("slide", "fixed"))
     for load in m.loads:
         if load.by_angle and (other := getattr(load, "other", None)):
             groups = _merged(groups, {str(getattr(load, "body", "")), other})
     return sorted(groups, key=lambda names: GROUND not in names)
 
 
-def gain_of(m: Mechanism, drive: PlanarDrive) -> float:
+def gain_of(m: Mechanism, drive: Drive) -> float:
     """By how much the body of a prescribed drive, or of the one that gives the period, turns in a revolution, rad."""
     main = m.period
     if drive is main or not main.prescribed:
@@ -228,7 +218,7 @@ def gain_of(m: Mechanism, drive: PlanarDrive) -> float:
 def _turned(m: Mechanism) -> None:
     """Bodies whose angles loads act by can turn, and the angle does not go round and round with the revolutions: that of one
     body, or between two."""
-    still, *_ = joined(m, (PlanarSlide, PlanarFixed))
+    still, *_ = joined(m, ("slide", "fixed"))
     gains: dict[str, set[float]] = {}
     for names in coupled(m):
         driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
@@ -266,11 +256,11 @@ def _numbers(m: Mechanism) -> None:
                 "Write the moment of inertia about its mass centre in kg m2, or put an ideal pin off its mass centre",
             )  # fmt: skip
     for drive in m.drives:
-        if isinstance(drive, driving.PlanarHarmonic) and drive.amplitude == 0:
+        if drive.kind == "harmonic" and drive.amplitude == 0:
             key = f"drives.{drive.name}.amplitude"
             raise InputError(key, 0.0, "there would be no motion", "Write an amplitude")
     for joint in m.ideal:
-        if isinstance(joint, PlanarRevolute) and joint.friction is not None and modes_of(m):
+        if joint.kind == "revolute" and joint.friction is not None and modes_of(m):
             raise InputError(
                 f"joints.{joint.name}.friction", joint.friction.coefficient,
                 "reactions of pins are not modelled where a bar bends", "Remove it, or bending",
@@ -292,23 +282,23 @@ def massless_angles(m: Mechanism) -> set[str]:
             for body, here, carrier in ((one, point, two), (two, other, one)):
                 if body not in found or carrier in found:
                     continue
-                if isinstance(joint, Pin):
+                if joint.kind in PINS:
                     held = tuple(m.body(body).points[here]) != tuple(m.body(body).center)
                 else:
-                    held = isinstance(joint, (PlanarSlide, PlanarFixed))
+                    held = joint.kind in ("slide", "fixed")
                 found -= {body} if held else set()
     return found
 
 
-def turning(m: Mechanism, held_by: tuple[type, ...] | None = None) -> set[str]:
+def turning(m: Mechanism, held_by: tuple[str, ...] | None = None) -> set[str]:
     """Names of bodies whose angle is neither prescribed, or prescribed by such drives, nor that of the ground."""
     held = {
         drive.body
         for drive in m.drives
-        if (drive.prescribed if held_by is None else isinstance(drive, held_by))
+        if (drive.prescribed if held_by is None else drive.kind in held_by)
     }
     still: set[str] = set()
-    for group in joined(m, (PlanarSlide, PlanarFixed)):
+    for group in joined(m, ("slide", "fixed")):
         if GROUND in group or group & held:
             still |= group
     return {body.name for body in m.bodies} - still
@@ -332,14 +322,14 @@ def _drives(m: Mechanism) -> None:
             "drives", None, "nothing drives the mechanism",
             'Add [drives.NAME] with a kind, say "constant-speed", and a body; "free" with an interval lets it go',
         )  # fmt: skip
-    groups = joined(m, (PlanarSlide, PlanarFixed))
+    groups = joined(m, ("slide", "fixed"))
     driven: dict[int, str] = {}
     for drive in m.drives:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
-        if GROUND in groups[group] and not isinstance(drive, driving.PlanarFree):
+        if GROUND in groups[group] and drive.kind != "free":
             raise InputError(
                 f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
-                "PlanarDrive a body on a revolute joint",
+                "Drive a body on a revolute joint",
             )  # fmt: skip
         if group in driven:
             raise InputError(
@@ -360,7 +350,7 @@ def _one_period(m: Mechanism) -> None:
         )  # fmt: skip
     main = m.period
     for drive in m.drives:
-        if drive is not main and isinstance(drive, driving.PlanarTable) and drive.advance:
+        if drive is not main and drive.kind == "table" and drive.advance:
             raise InputError(
                 f"drives.{drive.name}.angle", drive.advance, "goes round by full turns, but another drive defines the period",
                 "End it at the angle where it began, or set period = true here",
@@ -378,8 +368,8 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {PlanarRevolute: 2, PlanarSlide: 2, PlanarSlot: 1, PlanarFixed: 3}
-    ideal = sum(taken[type(joint)] for joint in m.ideal)
+    taken = {"revolute": 2, "slide": 2, "slot": 1, "fixed": 3}
+    ideal = sum(taken[joint.kind] for joint in m.ideal)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
 

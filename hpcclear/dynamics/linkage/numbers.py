@@ -9,10 +9,8 @@ from hpcclear.dynamics.linkage import bending
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Number, split
+from hpcclear.dynamics.linkage.parts import PINS, Number, split
 from hpcclear.dynamics.linkage.trees import Forest, forest
-from hpcclear.scene.driving import PlanarHarmonic, PlanarSpeed, PlanarTable, PlanarTorque
-from hpcclear.scene.planar import Aligned
 
 
 def values(
@@ -27,7 +25,7 @@ def values(
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)
     for joint in mechanism.joints:
-        if isinstance(joint, Aligned):
+        if joint.kind not in PINS:
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
         rubs = getattr(joint, "friction", None)
@@ -82,20 +80,20 @@ def _outside(trees: Forest, found: dict[str, Number]) -> None:
         frame = trees.frames[drive.body]
         start = trees.mechanism.body(drive.body).start_angle - trees.offsets[drive.body]
         found |= {f"{frame}_start": start, f"{drive.name}_drive_start": start}
-        match drive:
-            case PlanarSpeed():
+        match drive.kind:
+            case "constant-speed":
                 found[f"{drive.name}_speed"] = drive.speed
-            case PlanarHarmonic():
+            case "harmonic":
                 found[f"{drive.name}_mean"] = drive.mean - trees.offsets[drive.body]
                 found[f"{drive.name}_amplitude"] = drive.amplitude
                 found[f"{drive.name}_rate"] = 2 * math.pi * drive.frequency
                 found[f"{drive.name}_phase"] = drive.phase
-            case PlanarTable():
+            case "table":
                 found[f"{drive.name}_rate"] = drive.advance / drive.seconds
                 found[f"{drive.name}_shift"] = trees.offsets[drive.body]
             case _:
                 found[f"{drive.name}_speed"] = drive.initial_speed
-        if isinstance(drive, PlanarTorque):
+        if drive.kind == "torque":
             known = drive.torque is not None and not drive.table
             found[f"{drive.name}_torque"] = drive.torque if known else 1.0  # type: ignore[assignment]
             for name, rows in drive.straight.items():

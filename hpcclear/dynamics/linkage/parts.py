@@ -6,7 +6,7 @@ angles count counter-clockwise.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,13 +15,60 @@ from hpcclear.base.outcome import CORNERS, WALLS
 from hpcclear.dynamics.contacts import guide, pin_in_slot
 from hpcclear.dynamics.contacts.declared import ContactGeometry
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.planar import BarBending, Loose, Pin, PlanarClearance, PlanarJoint, PlanarSlide
 
 GROUND = "ground"
 Pair = tuple[float, float]
 Number = float | Array
 """One number, or those of samples (m,)."""
+PINS = ("revolute", "clearance")
+KINDS = (*PINS, "slide", "slot", "fixed")
+"""Of joints."""
+
+
+class Part(Protocol):
+    """What is known here of a joint or a drive: its table in a scene (`hpcclear.scene.planar`, `driving`).
+
+    What its kind has not is not asked for: pins have `journal` and `bearing`, other joints `point`, `line` and its `angle`.
+    """
+
+    name: str
+    kind: str
+    journal: str
+    bearing: str
+    point: str
+    line: str
+    angle: float
+    body: str
+    period: bool
+    prescribed: bool
+    table: bool
+    turns: int
+    seconds: float
+    advance: float
+    curves: tuple[str, ...]
+    straight: dict[str, tuple[Pair, ...]]
+
+    def __getattr__(self, entry: str) -> Any:
+        """Any other entry, SI; a number or an array of samples."""
+
+
+Joint = Part
+Drive = Part
+
+
+class LoadTerms(Part, Protocol):
+    """The same of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds by an `acting.Acting`.
+
+    Its entries `place`, `first` and `second` are places, `body` and `other` bodies that rotate, where it has these.
+    """
+
+    by_angle: bool
+
+    def numbers(self) -> Mapping[str, Number]:
+        """Its parameters, SI; numbers or arrays of samples."""
+
+    def act(self, on: Any) -> Any:
+        """Add its forces and torques to a motion; return the power that it gives, W, as a term."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +85,7 @@ class Body:
     center: Pair = (0.0, 0.0)
     points: Mapping[str, Pair] = field(default_factory=dict)
     start_angle: float = 0.0
-    bending: BarBending | None = None
+    bending: Any = None
 
 
 class Contact(NamedTuple):
@@ -49,7 +96,7 @@ class Contact(NamedTuple):
     """
 
     name: str
-    joint: Loose
+    joint: Joint
     journal: str
     bearing: str
     geometry: ContactGeometry
@@ -61,54 +108,59 @@ class Contact(NamedTuple):
         return self.name.replace(".", "_")
 
 
-def contacts_of(joint: Loose) -> tuple[Contact, ...]:
+def contacts_of(joint: Joint) -> tuple[Contact, ...]:
     """The contacts of a joint with clearance: of a guide's corners, in the order of `CORNERS`, or a slot's `WALLS`."""
     geometry = GEOMETRIES[joint.geometry]
-    if isinstance(joint, PlanarClearance):
+    if joint.kind == "clearance":
         return (Contact(joint.name, joint, joint.journal, joint.bearing, geometry),)
     sides = {**WALLS, **{word: side for word, (_, side) in CORNERS.items()}}
     corner_of = f"{split(joint.point)[0]}.{joint.name}_"
     return tuple(
         Contact(
             f"{joint.name}.{word}", joint,
-            joint.point if isinstance(joint, PlanarSlot) else corner_of + word,
+            joint.point if joint.kind == "slot" else corner_of + word,
             joint.line, geometry, sides[word],
         )
         for word in joint.corners
     )  # fmt: skip
 
 
-def start_of(joint: Loose) -> tuple[Number, ...]:
+def start_of(joint: Joint) -> tuple[Number, ...]:
     """Of a joint with clearance at the start: the journal's eccentricity, m; the offset of a pin in a slot; offset and tilt,
     rad, of a slider."""
-    if isinstance(joint, PlanarClearance):
+    if joint.kind == "clearance":
         return joint.start_eccentricity.x, joint.start_eccentricity.y
-    entries = ("start_offset",) if isinstance(joint, PlanarSlot) else ("start_offset", "start_tilt")
+    entries = ("start_offset",) if joint.kind == "slot" else ("start_offset", "start_tilt")
     given = (getattr(joint, entry) for entry in entries)
     return tuple(0.0 if one is None else one for one in given)
 
 
-def gaps_of(joint: Loose) -> tuple[Number, ...]:
+def gaps_of(joint: Joint) -> tuple[Number, ...]:
     """Of its contacts at the start, m, below 0 in flight."""
-    if isinstance(joint, PlanarClearance):
+    if joint.kind == "clearance":
         start = joint.start_eccentricity
         return (np.hypot(start.x, start.y) - joint.clearance,)
-    module = pin_in_slot if isinstance(joint, PlanarSlot) else guide
+    module = pin_in_slot if joint.kind == "slot" else guide
     return tuple(module.gap_of(joint, word, *start_of(joint)) for word in joint.corners)
 
 
-def corners_of(joint: PlanarSlide, middle: Pair) -> dict[str, Pair]:
+def corners_of(joint: Any, middle: Pair) -> dict[str, Pair]:
     """Points of a slider that are centres of its corners, `middle` its place in the slider's axes."""
     size = joint.length, joint.height
     return {
-        f"{joint.name}_{word}": guide.corner(middle, size, joint.corner_radius, word)  # type: ignore[arg-type]
+        f"{joint.name}_{word}": guide.corner(middle, size, joint.corner_radius, word)
         for word in CORNERS
     }
 
 
-def places_of(joint: PlanarJoint) -> tuple[str, str]:
+def is_loose(joint: Joint) -> bool:
+    """Whether a joint has clearance."""
+    return getattr(joint, "clearance", None) is not None
+
+
+def places_of(joint: Joint) -> tuple[str, str]:
     """Both places: journal and bearing, or that of the body and that of the one that carries the line."""
-    if isinstance(joint, Pin):
+    if joint.kind in PINS:
         return joint.journal, joint.bearing
     return joint.point, joint.line
 

@@ -13,9 +13,8 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Number
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Number
 from hpcclear.dynamics.linkage.trees import Forest
-from hpcclear.scene.planar import Aligned, PlanarSlide
 
 
 class Pose(NamedTuple):
@@ -58,7 +57,7 @@ class Poses:
             places = contact.journal, contact.bearing
             journal, bearing = (kin.position(kin.point(place)) for place in places)
             apart = journal - bearing
-            if isinstance(contact.joint, Aligned):  # the part across the line
+            if contact.joint.kind not in PINS:  # the part across the line
                 across = Closing(kin, writer).direction(contact.joint).across()
                 apart = across.times(dot(apart, across))
             for axis, part in enumerate(apart):
@@ -145,7 +144,7 @@ def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tup
 def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Number]:
     """How far a body has come along its guide, m, and how fast it moves."""
     hang = forest.hangs[body]
-    assert isinstance(hang.joint, PlanarSlide)
+    assert hang.joint is not None
     own, own_speed, _, _ = placed(assembly, hang.own)
     base, base_speed, _, _ = placed(assembly, hang.parent)
     _, _, angle, spin = placed(assembly, hang.joint.point)

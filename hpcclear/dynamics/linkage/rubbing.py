@@ -15,9 +15,7 @@ from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
 from hpcclear.dynamics.linkage.kinematics import Mover
-from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.planar import Pin, PlanarJoint, PlanarSlide
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Joint, places_of, split
 
 PASSES = 4
 """Of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars."""
@@ -52,7 +50,7 @@ class Rubbing:
     influence: dict[Mover, Term]
     reaction: list[tuple[Term, dict[int, Term]]]
 
-    def __init__(self, joint: PlanarJoint, of: Solving) -> None:
+    def __init__(self, joint: Joint, of: Solving) -> None:
         self.joint, self.of = joint, of
         self.writer: Writer = of.balance.writer
         self.number = {column: k for k, column in enumerate(of.columns)}
@@ -124,7 +122,7 @@ class RubbingGuide(Rubbing):
         The unknown that holds the guide: its slider's coordinate, or the multiplier across it.
     """
 
-    def __init__(self, joint: PlanarSlide, of: Solving) -> None:
+    def __init__(self, joint: Joint, of: Solving) -> None:
         super().__init__(joint, of)
         balance, body, n = of.balance, self.body, len(of.columns)
         if body is not None:
@@ -183,7 +181,7 @@ class RubbingPin(Rubbing):
     In a tree its reaction is what the bodies beyond it require: inertia and weight, less the forces on them.
     """
 
-    def __init__(self, joint: Pin, of: Solving) -> None:
+    def __init__(self, joint: Joint, of: Solving) -> None:
         super().__init__(joint, of)
         kin = of.balance.kinematics
         journal, bearing = (kin.forest.frames[split(place)[0]] for place in places_of(joint))
@@ -230,15 +228,15 @@ class RubbingPin(Rubbing):
             for axis in "xy"
         ]
 
-    def _held(self, closure: object) -> list[tuple[str, Vector]]:
+    def _held(self, closure: Joint) -> list[tuple[str, Vector]]:
         """By constraint of a joint that closes a loop: the force that it takes off what is beyond."""
-        if not isinstance(closure, (Pin, PlanarSlot)):
+        if closure.kind not in (*PINS, "slot"):
             return []  # what is left over of trees are pins and slots
         first, second = (split(place)[0] in self.beyond for place in places_of(closure))
         if first == second:
             return []
         sign = -ONE if first else ONE
-        if isinstance(closure, PlanarSlot):
+        if closure.kind == "slot":
             across = self.of.closing.direction(closure).across()
             return [(f"{closure.name}_across", across.times(sign))]
         axes = {"x": Vector(sign, ZERO), "y": Vector(ZERO, sign)}
@@ -259,9 +257,9 @@ def rubbing_of(of: Solving) -> list[Rubbing]:
     for joint in of.balance.forest.mechanism.joints:
         if getattr(joint, "friction", None) is None:
             continue
-        if isinstance(joint, PlanarSlide):
+        if joint.kind == "slide":
             found.append(RubbingGuide(joint, of))
-        elif isinstance(joint, Pin):
+        elif joint.kind in PINS:
             pin = RubbingPin(joint, of)
             found += [pin] if pin.turns else []
     return found

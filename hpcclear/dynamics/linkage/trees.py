@@ -12,10 +12,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
-from hpcclear.scene.driving import PlanarDrive
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.planar import Pin, PlanarFixed, PlanarJoint, PlanarRevolute, PlanarSlide
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, Part, places_of, split
 
 
 class Coordinate(NamedTuple):
@@ -35,7 +32,7 @@ class Coordinate(NamedTuple):
 class Hang(NamedTuple):
     """How a body hangs in its tree: by a joint, from a place of its parent, at a place of its own; free without joint."""
 
-    joint: PlanarJoint | None
+    joint: Joint | None
     parent: str = ""
     own: str = ""
 
@@ -53,9 +50,9 @@ class Forest:
     """By how much each body is turned against its frame, rad."""
     coordinates: tuple[Coordinate, ...]
     """Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last."""
-    prescribed: dict[str, PlanarDrive]
+    prescribed: dict[str, Drive]
     """Drives by frame, where the angle is given."""
-    closures: tuple[PlanarJoint | PlanarDrive, ...]
+    closures: tuple[Part, ...]
     """What is left as a constraint."""
     cartesian: bool = False
     """Whether every body is a tree by itself."""
@@ -78,7 +75,9 @@ class Forest:
         hang = self.hangs[body]
         if self.mechanism.body(body).bending is not None:
             return False
-        return isinstance(hang.joint, Pin) and split(hang.parent)[0] == GROUND
+        return (
+            hang.joint is not None and hang.joint.kind in PINS and split(hang.parent)[0] == GROUND
+        )
 
 
 def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) -> Forest:
@@ -89,8 +88,8 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
     joints = list(mechanism.joints if closed else mechanism.ideal)
     edges, closures = ([], joints) if cartesian else _spanning(mechanism)
     if cartesian:
-        edges = [joint for joint in closures if isinstance(joint, PlanarFixed)]
-        closures = [joint for joint in closures if not isinstance(joint, PlanarFixed)]
+        edges = [joint for joint in closures if joint.kind == "fixed"]
+        closures = [joint for joint in closures if joint.kind != "fixed"]
     hangs = _hung(mechanism, edges)
     frames, offsets = _frames(mechanism, hangs)
     prescribed = {frames[d.body]: d for d in mechanism.drives if d.prescribed and not cartesian}
@@ -101,14 +100,14 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
     )  # fmt: skip
 
 
-def _spanning(m: Mechanism) -> tuple[list[PlanarJoint], list[PlanarJoint]]:
+def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
     """Ideal joints of the trees, and those that close loops."""
     group = {name: name for name in (GROUND, *(body.name for body in m.bodies))}
-    edges: list[PlanarJoint] = []
-    closures: list[PlanarJoint] = []
-    order = {PlanarFixed: 0, PlanarSlide: 1, PlanarRevolute: 2}
-    for joint in sorted(m.ideal, key=lambda joint: order.get(type(joint), len(order))):
-        if isinstance(joint, PlanarSlot):  # nothing hangs by one constraint alone
+    edges: list[Joint] = []
+    closures: list[Joint] = []
+    order = {"fixed": 0, "slide": 1, "revolute": 2}
+    for joint in sorted(m.ideal, key=lambda joint: order.get(joint.kind, len(order))):
+        if joint.kind == "slot":  # nothing hangs by one constraint alone
             closures.append(joint)
             continue
         one, two = (group[split(place)[0]] for place in places_of(joint))
@@ -120,7 +119,7 @@ def _spanning(m: Mechanism) -> tuple[list[PlanarJoint], list[PlanarJoint]]:
     return edges, closures
 
 
-def _hung(m: Mechanism, edges: list[PlanarJoint]) -> dict[str, Hang]:
+def _hung(m: Mechanism, edges: list[Joint]) -> dict[str, Hang]:
     """How each body hangs; the ground is the first root, then the first body of each tree without it."""
     hangs: dict[str, Hang] = {}
     for root in (GROUND, *(body.name for body in m.bodies)):
@@ -146,7 +145,7 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
     frames, offsets = {GROUND: GROUND}, {GROUND: 0.0}
     for body, hang in hangs.items():
         parent = split(hang.parent)[0]
-        if isinstance(hang.joint, (PlanarSlide, PlanarFixed)):
+        if hang.joint is not None and hang.joint.kind in ("slide", "fixed"):
             turned = hang.joint.angle if hang.own == hang.joint.point else -hang.joint.angle
             frames[body], offsets[body] = frames[parent], offsets[parent] + turned
         else:
@@ -155,7 +154,7 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
 
 
 def _coordinates(
-    m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, PlanarDrive]
+    m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, Drive]
 ) -> tuple[Coordinate, ...]:
     found = [
         Coordinate(kind_of(mode), body.name)
@@ -169,7 +168,7 @@ def _coordinates(
             found += [Coordinate("x", body.name), Coordinate("y", body.name)]
         if frames[body.name] == body.name and body.name not in prescribed:
             found.append(Coordinate("angle", body.name))
-        if isinstance(joint, PlanarSlide):
+        if joint is not None and joint.kind == "slide":
             found.append(Coordinate("slide", body.name, joint.name))
     main = Coordinate("angle", frames[m.period.body])
     return (*(c for c in found if c != main), *(c for c in found if c == main))

@@ -10,6 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import placed
+from hpcclear.dynamics.linkage.generator import guide_of
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -24,7 +25,7 @@ from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.planar.turning import passage
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import PlanarTable
-from hpcclear.scene.planar import PlanarSlide, turns_of
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
 BEND = 1e-6
@@ -152,17 +153,15 @@ def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
     follow, mechanism = linkage.follow, held.assembly.loops.mechanism
     if not follow:
         return np.full(len(held.times), np.nan)
-    guides = [
-        j for j in mechanism.joints if isinstance(j, PlanarSlide) and split(j.point)[0] == follow
-    ]
-    place = follow if "." in follow else guides[0].point
+    guide = None if "." in follow else guide_of(mechanism, follow)
+    place = follow if guide is None else guide.point
     pose = replace(held.assembly, q=held.q.T, v=held.v.T)
     here, _, _, spin = placed(pose, place)
     name = split(place)[0]
     centre = placed(pose, f"{name}.{CENTER}", mechanism.body(name).center)[0]
     # as velocities follow from velocities, but for what the turning needs
     found = placed(replace(pose, v=held.a.T), place)[1] - spin**2 * (here - centre)
-    return found if "." in follow else (found * np.exp(-1j * guides[0].angle)).real
+    return found if guide is None else (found * np.exp(-1j * guide.angle)).real
 
 
 def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, Array]]:

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from hpcclear.base import errors
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
@@ -20,7 +21,6 @@ from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
-from hpcclear.scene.driving import PlanarSpeed
 from hpcclear.scene.planar import PlanarSlide, turns_of
 from hpcclear.scene.points import Numbers, Points
 
@@ -136,7 +136,9 @@ def check_drives(mechanism: Mechanism) -> None:
 
 def check_inertias(m: Mechanism) -> None:
     """InputError where a body by itself would need an inertia that it does not have: its angle does not grow evenly."""
-    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m, (PlanarSpeed,))
+    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(
+        m, ("constant-speed",)
+    )
     found -= {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
     for body in m.bodies:
         if body.name in found:
@@ -302,12 +304,8 @@ def scene_of(scene: Scene, points: Points, row: int) -> Scene:
 
 def put_together(mechanism: Mechanism) -> Assembly:
     """`assemble`, its InputError below ``mechanism``."""
-    try:
+    with errors.at("mechanism"):
         return assemble(mechanism)
-    except InputError as error:
-        raise InputError(
-            f"mechanism.{error.key}", error.value, error.reason, error.remedy
-        ) from None
 
 
 def poses_at_start(scene: Scene, turned: float = 0.0) -> dict[str, tuple[float, float, float]]:

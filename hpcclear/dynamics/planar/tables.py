@@ -3,7 +3,7 @@
 from typing import Any
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import at
 from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.dynamics.linkage.parts import Body, corners_of, split
@@ -14,12 +14,8 @@ from hpcclear.scene.points import Points
 
 def mechanism_of(planar: Planar) -> Mechanism:
     """The mechanism of a scene's tables; InputError names the entry below ``mechanism``."""
-    try:
+    with at("mechanism"):
         return Mechanism(**_tables(planar))
-    except InputError as error:
-        raise InputError(
-            f"mechanism.{error.key}", error.value, error.reason, error.remedy
-        ) from None
 
 
 def with_columns(scene: Scene, structure: Mechanism, points: Points) -> Mechanism:
@@ -56,7 +52,7 @@ def _body(body: PlanarBody, joints: tuple[PlanarJoint, ...]) -> Body:
     """A body; one that slides in channels wider than itself has the centres of its corners as points."""
     points = body.own_points
     for joint in joints:
-        if isinstance(joint, PlanarSlide) and is_loose(joint):
+        if is_loose(joint) and isinstance(joint, PlanarSlide):
             own, point = split(joint.point)
             if own == body.name and point in points:
                 points |= corners_of(joint, points[point])

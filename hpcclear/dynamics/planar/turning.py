@@ -6,6 +6,7 @@ ideal joints alone depend on one another there.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +15,11 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
+from hpcclear.dynamics.linkage.parts import Joint
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
 from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
 from hpcclear.scene.driving import FreeDriving, PlanarSpeed
-from hpcclear.scene.planar import Loose, PlanarClearance, PlanarJoint, PlanarRevolute, is_loose
+from hpcclear.scene.planar import PlanarClearance, PlanarRevolute, is_loose
 
 DEPENDENT = 1e-3
 """Smallest singular value of the ideal joints' constraints, rows scaled to 1, at which they depend on one another at a change
@@ -38,7 +40,7 @@ NEAR_CHANGE = 0.1
 def without_clearance(mechanism: Mechanism) -> Mechanism:
     """The mechanism with pins in place of clearances, and a drive of constant speed in place of a torque."""
     entries = ("name", "body", "period", "turns")
-    drives = tuple(
+    drives: Any = tuple(
         PlanarSpeed.model_construct(
             kind="constant-speed", speed=d.usual_speed, **{one: getattr(d, one) for one in entries}
         )
@@ -49,12 +51,12 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, joints=pinned(mechanism), drives=drives, loads=())
 
 
-def pinned(mechanism: Mechanism) -> tuple[PlanarJoint, ...]:
+def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
     return tuple(_ideal(joint) if is_loose(joint) else joint for joint in mechanism.joints)
 
 
-def _ideal(joint: Loose) -> PlanarJoint:
+def _ideal(joint: Any) -> Any:
     if not isinstance(joint, PlanarClearance):
         return joint.model_copy(update={"clearance": None})
     return PlanarRevolute.model_construct(

@@ -286,12 +286,9 @@ def total_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-def _total_caption(found: Results) -> str:
-    return f"Total error of f of one design against core time. {targets.caption(found)}"
-
-
 _FIGURES: tuple[tuple[Callable[..., "style.Figure"], tuple[str, ...], str | Callable[..., str]], ...] = (
-    (total_figure, ("spent_error", "averaging_error"), _total_caption),
+    (total_figure, ("spent_error", "averaging_error"),
+     lambda found: f"Total error of f of one design against core time. {targets.caption(found)}"),
     (spending_figure, ("spent_error",), "Error of a steady mean against run time by tolerance, and the bias of each."),
     (integration_figure, ("error",), "Error of one revolution against run time and force evaluations, by integrator."),
     (averaging_figure, ("averaging_error",), "Error of f against averaged revolutions, by transient."),

@@ -1,6 +1,6 @@
 """Contributions of random inputs to the variance of designs."""
 
-from hpcclear.results.rows import ResultKind, count, flag, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, number, text, with_error
 
 KIND = ResultKind(
     90, "Contributions to the scatter of designs", ("design", "input"),
@@ -18,7 +18,5 @@ KIND = ResultKind(
         "unexplained": number(("design",), "1", "share of the variance that no input or pair explains", required=True),
         "unexplained_error": number(("design",), "1", "standard error of it"),
         "group": count(("design", "input"), "number of the group of correlated inputs that share one contribution; 0 for none"),
-        "together": flag(("input",),
-            "whether the input is correlated with others and shares one contribution with them", "independent correlated"),
     },
 )

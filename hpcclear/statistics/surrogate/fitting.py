@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
-from hpcclear.statistics.surrogate.likelihood import Fitted, maximise
+from hpcclear.statistics.surrogate.likelihood import maximise
 
 LENGTH_BOUNDS = (1e-2, 1e2)
 """Length scales in the unit cube; over 1e-5 to 1e5 noisy fits can collapse."""
@@ -92,6 +92,8 @@ def fit_kriging(
     InputError
         Points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
+    from threadpoolctl import threadpool_limits
+
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     needed = points.shape[-1] + 3  # length scales, signal, noise, mean
     labels, valid = checked_samples(points, values, bounds, names, needed)
@@ -103,35 +105,17 @@ def fit_kriging(
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
     known = np.ones(len(values)) if shares is None else np.asarray(shares, dtype=np.float64)
-    normalised, limits = (outcomes - mean) / scale, noise or NOISE_BOUNDS
-    found = _maximise_likelihood(
-        unit, normalised, rng, restarts, lengths, kernel, limits, known[valid]
-    )
+    limits = noise or NOISE_BOUNDS
+    dims = unit.shape[1]
+    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *limits)])
+    box = np.array([SIGNAL_BOUNDS, *[lengths] * dims, limits])
+    seed = int(rng.integers(2**31))
+    # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = maximise(
+            unit, (outcomes - mean) / scale, start, box, restarts, seed, kernel=kernel, shares=known[valid]
+        )  # fmt: skip
     return Kriging(
         labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],
         dropped=int((~valid).sum()), kernel=kernel, shares=None if shares is None else known[valid],
     )  # fmt: skip
-
-
-def _maximise_likelihood(
-    unit: np.ndarray,
-    normalised: np.ndarray,
-    rng: np.random.Generator,
-    restarts: int,
-    lengths: tuple[float, float],
-    kernel: Kernel,
-    noise: tuple[float, float],
-    shares: np.ndarray,
-) -> Fitted:
-    """Length scales, variances and alpha, of normalised data in the unit cube."""
-    from threadpoolctl import threadpool_limits
-
-    dims = unit.shape[1]
-    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *noise)])
-    bounds = np.array([SIGNAL_BOUNDS, *[lengths] * dims, noise])
-    seed = int(rng.integers(2**31))
-    # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
-    with threadpool_limits(limits=1, user_api="blas"):
-        return maximise(
-            unit, normalised, start, bounds, restarts, seed, kernel=kernel, shares=shares
-        )
