@@ -27,6 +27,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
     from hpcclear.dynamics import sizing
+    from hpcclear.dynamics.planar.problem import cautions_of
     from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
@@ -68,7 +69,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     show_rows("Model", rows)
     for text in (*files_run(scene.plugins), *scene.readings):
         print_remark("Note", text)
-    warned = [*locked, *_cautions(scene), *scene.warnings]
+    warned = [*locked, *cautions_of(scene), *scene.warnings]
     most = len(warned) if detailed() else MOST_WARNINGS
     for warning in warned[:most]:
         print_remark("Warning", warning)
@@ -147,12 +148,6 @@ def _locked(scene: Scene) -> list[str]:
     if not varies_geometry(scene):
         raise refusal[1]
     return [f"the scene's own design {refusal[1].reason}; its run time is not measured"]
-
-
-def _cautions(scene: Scene) -> tuple[str, ...]:
-    from hpcclear.dynamics.planar.problem import cautions_of
-
-    return cautions_of(scene)
 
 
 def _mpi(ranks: "Ranks | None") -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, Part, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, TableRow, places_of, split
 
 
 class ClosureRow(NamedTuple):
@@ -34,7 +34,7 @@ class Closing:
     kinematics: Kinematics
     writer: Writer
 
-    def rows(self, one: Part) -> list[ClosureRow]:
+    def rows(self, one: TableRow) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
         if one.kind in PINS:
             return self._pin(one)

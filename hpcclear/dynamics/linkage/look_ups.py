@@ -5,14 +5,14 @@ from typing import NamedTuple
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.expression import Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics
-from hpcclear.dynamics.linkage.parts import Part
+from hpcclear.dynamics.linkage.parts import TableRow
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest
 
 CLOCK = f"(work[{at.BEGAN} * W + i] + work[{at.STAGE_TIME} * W + i])"
 
 
-def curves_of(part: Part) -> list[str]:
+def curves_of(part: TableRow) -> list[str]:
     """Names of the tabulated curves that a drive or load has."""
     return [f"{part.name}.{one}" for one in part.curves] or [part.name] * part.table
 
@@ -46,7 +46,7 @@ class LookUps:
             name: self._of(one) for one in (*m.drives, *m.loads) for name in curves_of(one)
         }
 
-    def _of(self, part: Part) -> LookUp:
+    def _of(self, part: TableRow) -> LookUp:
         main = self._forest.mechanism.period
         if part.kind == "table":
             share = main.seconds / part.seconds / main.turns / at.TURN

@@ -25,7 +25,7 @@ KINDS = (*PINS, "slide", "slot", "fixed")
 """Of joints."""
 
 
-class Part(Protocol):
+class TableRow(Protocol):
     """What is known here of a joint or a drive: its table in a scene (`hpcclear.scene.planar`, `driving`).
 
     What its kind has not is not asked for: pins have `journal` and `bearing`, other joints `point`, `line` and its `angle`.
@@ -52,11 +52,11 @@ class Part(Protocol):
         """Any other entry, SI; a number or an array of samples."""
 
 
-Joint = Part
-Drive = Part
+Joint = TableRow
+Drive = TableRow
 
 
-class LoadTerms(Part, Protocol):
+class LoadTerms(TableRow, Protocol):
     """The same of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds by an `acting.Acting`.
 
     Its entries `place`, `first` and `second` are places, `body` and `other` bodies that rotate, where it has these.

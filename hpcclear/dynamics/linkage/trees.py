@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, Part, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, TableRow, places_of, split
 
 
 class Coordinate(NamedTuple):
@@ -52,7 +52,7 @@ class Forest:
     """Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last."""
     prescribed: dict[str, Drive]
     """Drives by frame, where the angle is given."""
-    closures: tuple[Part, ...]
+    closures: tuple[TableRow, ...]
     """What is left as a constraint."""
     cartesian: bool = False
     """Whether every body is a tree by itself."""

@@ -53,15 +53,15 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
-    return tuple(_ideal(joint) if is_loose(joint) else joint for joint in mechanism.joints)
-
-
-def _ideal(joint: Any) -> Any:
-    if not isinstance(joint, PlanarClearance):
-        return joint.model_copy(update={"clearance": None})
-    return PlanarRevolute.model_construct(
-        name=joint.name, kind="revolute", journal=joint.journal, bearing=joint.bearing
-    )
+    joints: list[Any] = list(mechanism.joints)
+    for k, joint in enumerate(mechanism.joints):
+        if isinstance(joint, PlanarClearance):
+            joints[k] = PlanarRevolute.model_construct(
+                name=joint.name, kind="revolute", journal=joint.journal, bearing=joint.bearing
+            )
+        elif is_loose(joint):
+            joints[k] = joint.model_copy(update={"clearance": None})
+    return tuple(joints)
 
 
 def _by_torque(mechanism: Mechanism) -> bool:
