@@ -1,9 +1,10 @@
 """The page of linkages: a sketch of each scene in jobs/linkages, and what its small study answers.
 
-    python analysis/gallery.py [RESULTS]
+    python analysis/gallery.py [RESULTS [NAME ...]]
 
-Runs the studies that are not in RESULTS yet (a directory a scene; ``results/gallery`` by default), draws the sketches into
-``docs/images/gallery`` and writes the answers to ``analysis/results/gallery_*.csv``.
+Of all scenes of the page, or those that are named: runs the studies that are not in RESULTS yet (a directory a scene;
+``results/gallery`` by default), draws the sketches into ``docs/images/gallery`` and writes the answers to
+``analysis/results/gallery_*.csv``.
 """
 
 import re
@@ -43,11 +44,12 @@ def lines_of(place: Path) -> dict[str, str]:
     """What the first screen of a study says: headline, figures with their intervals, values of the design."""
     first = screen_of(read(place))
     assert first is not None
-    shown = {"recommended": first.headline, "doubt": first.doubt}
-    shown |= {
-        tile.label: f"{tile.value} {tile.within} {tile.change}".strip() for tile in first.tiles
-    }
-    return shown | {row.label: row.cells[-1] for row in first.rows}
+    values = ", ".join(f"{row.label} = {row.cells[-1]}" for row in first.rows)
+    shown = {"answer": first.headline, "doubt": first.doubt, "values": values}
+    for tile in first.tiles:
+        moved = f", {tile.change} from {tile.before}" if tile.change else ""
+        shown[tile.label] = f"{tile.value} {tile.within}{moved}"
+    return shown
 
 
 def table_of(columns: dict[str, dict[str, str]]) -> list[tuple[str, ...]]:
@@ -57,9 +59,9 @@ def table_of(columns: dict[str, dict[str, str]]) -> list[tuple[str, ...]]:
     return [("line", *columns), *rows]
 
 
-def main(results: Path) -> None:
+def main(results: Path, *names: str) -> None:
     """Run what is missing, draw, record."""
-    for name in re.findall(r"run jobs/linkages/(\w+)\.toml", PAGE.read_text()):
+    for name in names or re.findall(r"run jobs/linkages/(\w+)\.toml", PAGE.read_text()):
         run(name, results / name)
         scene = load_scene(ROOT / "jobs" / "linkages" / f"{name}.toml")
         picture = PAGE.parent.parent / "images" / "gallery" / f"{name}.png"
@@ -77,4 +79,5 @@ def main(results: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "results" / "gallery")
+    place, *names = sys.argv[1:] or [ROOT / "results" / "gallery"]
+    main(Path(place), *names)

@@ -24,8 +24,8 @@ def sentence() -> str:
     with (RESULTS / "gallery_press.csv").open(newline="", encoding="utf-8") as file:
         found = {label: text for label, text, *_ in csv.reader(file)}
     return (
-        f"The [study of this press](PAGE) recommends {found['values']}: its mean gap is {found['mean']}, "
-        f"and the standard deviation {found['std. deviation']}."
+        f"The [study of this press](PAGE): {found['answer'].partition(': ')[2]} with {found['values']}. "
+        f"Mean gap f {found['mean of f']}; standard deviation {found['standard deviation of f']}."
     )
 
 

@@ -64,6 +64,7 @@ class Browser:
         self._base = f"http://127.0.0.1:{self._port()}"
         options = {"args": list(_ARGUMENTS), "binary": binary}
         wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}
+        wanted |= {"timeouts": {"script": int(1e3 * crowded(100))}}
         made = self._ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
         self._base += f"/session/{made['sessionId']}"
 

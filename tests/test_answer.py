@@ -113,8 +113,7 @@ def opened(content, **more):
 def test_the_first_screen_has_the_design_beside_todays_with_changes_and_intervals():
     first = opened(verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN)))
     assert (
-        first.headline
-        == "Design robust alpha: 50 % lower mean of f, 33 % lower standard deviation of f"
+        first.headline == "Recommended design: 50 % lower mean gap, 33 % lower standard deviation"
     )
     mean, deviation, percentile = first.tiles
     assert mean[1:] == ("0.2 mm", "0.4 mm", "\u221250 %", "± 0.5 %", True)
@@ -165,9 +164,9 @@ def test_an_original_that_is_best_is_kept():
 def test_designs_that_a_publication_prints_or_that_failed_are_not_taken():
     printed = np.array([np.nan, 1e-4, np.nan, np.nan, np.nan])
     content = verified(MEAN, DEVIATION, mean_paper=printed, deviation_paper=printed)
-    assert opened(content).headline.startswith("Design robust front 1: ")
+    assert told(content)["criterion"].startswith("robust front 1: ")
     gone = [np.nan if k == 1 else x for k, x in enumerate(MEAN)]
-    assert opened(verified(gone, DEVIATION)).headline.startswith("Design robust front 1: ")
+    assert told(verified(gone, DEVIATION))["criterion"].startswith("robust front 1: ")
     assert told(verified([np.nan] * 5, DEVIATION)) == {}
     assert opened(verified([np.nan] * 5, DEVIATION)) is None
 

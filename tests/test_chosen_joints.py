@@ -35,7 +35,7 @@ def test_f_is_the_mean_gap_of_the_joint_that_is_named(path, joint, place):
     assert float(every["objective"]) == pytest.approx(np.hypot(*gaps), rel=1e-15)
     assert float(one["objective"]) == gaps[place]
     np.testing.assert_array_equal(one["mean_gap"], gaps)
-    assert one.attrs["objective"] == f"mean distance from the clearance circle, of {joint}"
+    assert one.attrs["objective"] == f"mean gap between journal and bearing, of {joint}"
 
 
 def test_all_joints_named_is_none_named():

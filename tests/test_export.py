@@ -51,18 +51,26 @@ def test_a_sample_has_one_row_with_its_joints_as_columns_and_words_for_codes():
 
 
 @pytest.mark.parametrize(
-    ("line", "units", "heading", "factor"),
+    ("overrides", "units", "heading", "factor"),
     [
-        ('x = "0.3 mm"', (), "C [mm]", 1e3),
-        ('x = "0.3 mm"\n[study.variables]\nC = { range = ["300 um", "1 mm"] }', (), "C [um]", 1e6),
-        ('# set: joints.o2.clearance=0.3 mm\nx = "20 rpm"', (), "C [mm]", 1e3),
-        ("x = 3e-4", (), "C [m]", 1.0),
-        ('x = "0.3 mm"', ("SI",), "C [m]", 1.0),
-        ('x = "0.3 mm"', ("kN", "um"), "C [um]", 1e6),
+        ([], (), "C [mm]", 1e3),
+        (['study.variables.C={range=["300 um", "1 mm"]}'], (), "C [um]", 1e6),
+        (
+            ["study.variables.C={range=[3e-4, 1e-3]}", "study.random.C.range=[3e-4, 1e-3]"],
+            (),
+            "C [mm]",
+            1e3,
+        ),
+        (None, (), "C [m]", 1.0),
+        ([], ("SI",), "C [m]", 1.0),
+        ([], ("kN", "um"), "C [um]", 1e6),
     ],
 )
-def test_units_are_those_asked_for_else_those_of_the_scene(line, units, heading, factor):
-    samples = data.samples().assign_attrs(scene=line)
+def test_units_are_those_asked_for_else_those_of_the_scene(overrides, units, heading, factor):
+    samples = data.samples()
+    if overrides is not None:
+        scene = hpcclear.load_scene("jobs/quickstart.toml", overrides)
+        samples = samples.assign_attrs(scene.origin)
     table = to_table(samples, units)
     np.testing.assert_allclose(table[heading], factor * samples["C"], rtol=1e-15)
     if "kN" in units:
@@ -124,7 +132,7 @@ def test_files_say_their_units_and_their_scene(tmp_path):
         export(tmp_path / "s.nc", tmp_path / f"s{ending}", ("mm",))
     content = loadmat(tmp_path / "s.mat", squeeze_me=True)
     assert str(content["units"]["objective"]) == "mm"
-    assert "mean distance" in str(content["long_names"]["objective"])
+    assert "mean gap" in str(content["long_names"]["objective"])
     assert str(content["about_scene_hash"]) == "0" * 64
     about = parquet.read_metadata(tmp_path / "s.parquet").metadata
     assert json.loads(about[b"units"])["C [mm]"] == "mm"

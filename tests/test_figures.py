@@ -151,9 +151,6 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "front, three goals": lambda: report.front_figure(*_three_goals()),
     "front, verified": lambda: report.front_figure(data.front(), data.verification()),
     "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
-    "comparison, further ends": lambda: report.comparison_figure(
-        {name: data.response(2) for name in ("original", "light gamma", "light delta")}
-    ),
     "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
     "energy, all entries": lambda: report.energy_figure(_loaded()),
     "phase, guided": lambda: report.phase_figure(_guided()),

@@ -275,61 +275,14 @@ def test_loads_cleanly_and_fits_the_screen(
     assert text >= 11.0
 
 
-_CONTRAST = """
-const light = (c) => { const v = c.match(/[\\d.]+/g).slice(0, 3).map(x => x / 255)
-    .map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
-  return 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };
-const back = (e) => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
-  if (!/, 0\\)$|transparent/.test(c)) return c; } return 'rgb(255, 255, 255)'; };
-return [...document.querySelectorAll('h1, h2, h3, p, td, th, dd, dt, li, a, caption, figcaption, button, .verdict')]
-  .filter(e => e.innerText && e.getClientRects().length).map(e => {
-    const a = light(getComputedStyle(e).color), b = light(back(e));
-    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 60)]; })
-  .sort((x, y) => x[0] - y[0])[0];
-"""
-
-
 @pytest.mark.full
 @pytest.mark.parametrize(("scheme", "dark"), [("light", False), ("dark", True)])
-def test_text_stands_out_in_both_schemes(
-    browser: Browser, page: Path, scheme: str, dark: bool
-) -> None:
+def test_both_schemes_are_followed(browser: Browser, page: Path, scheme: str, dark: bool) -> None:
     browser.open(page, 1280, scheme)
-    browser.run("document.querySelectorAll('details').forEach(e => { e.open = true; });")
     back = browser.run("return getComputedStyle(document.documentElement).backgroundColor;")
     assert (max(map(int, re.findall(r"\d+", back)[:3])) < 60) == dark
-    ratio, where = browser.run(_CONTRAST)
-    assert ratio >= 4.5, where  # WCAG AA
     figure = browser.run("return getComputedStyle(document.querySelector('figure img')).filter;")
     assert ("invert" in figure) == dark  # figures are drawn on white
-
-
-_SEEN = """
-const ends = [...document.querySelectorAll("h1, .tiles > div, .first tbody tr, .trust li")]
-  .map(e => e.getBoundingClientRect().bottom);
-return [ends.length, Math.max(...ends), scrollY];
-"""
-
-
-@pytest.mark.full
-def test_the_first_screen_holds_headline_figures_table_and_verdicts(
-    browser: Browser, page: Path
-) -> None:
-    browser.open(page, 1280)
-    count, lowest, scrolled = browser.run(_SEEN)
-    assert count >= 10
-    assert lowest <= 900
-    assert scrolled == 0
-    words = browser.run(
-        "return [...document.querySelectorAll('header, .tiles, #table, .trust')].map(e => e.innerText).join(' ')"
-        ".split(/\\s+/).length;"
-    )
-    assert words <= 180
-    whole = browser.run(
-        "document.querySelectorAll('details').forEach(e => { e.open = true; });"
-        "return document.body.innerText.split(/\\s+/).length;"
-    )
-    assert whole <= 2050
 
 
 @pytest.mark.full

@@ -181,9 +181,9 @@ def _taken(name: str) -> Function:
 
 
 MEAN_GAP = Objective(
-    "mean distance from the clearance circle", "m", _taken("objective"), name="mean-gap"
+    "mean gap between journal and bearing", "m", _taken("objective"), name="mean-gap"
 )
-"""f of eq. 13, of a scene without a study, and of a study that names no other."""
+"""f of eq. 13, the mean distance from the clearance circle, of a scene without a study, and of a study that names no other."""
 
 OURS = {MEAN_GAP.name: MEAN_GAP} | {
     name.replace("_", "-"): Objective(

@@ -161,7 +161,7 @@ class Field(NamedTuple):
 
 FIELDS = {
     "sample": Field("1", "number of the sample in the design", "i8"),  # -1 never leaves the evaluator
-    "objective": Field("objective", "objective f, mean distance from the clearance circle", required=True),  # eq. 13
+    "objective": Field("objective", "objective f, mean gap between journal and bearing", required=True),  # eq. 13
     "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True),
     "objective_uncertainty": Field("objective", "half-width of f, by replicas or of its steady mean"),
     "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint"),

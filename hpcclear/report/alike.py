@@ -119,6 +119,5 @@ def spans(ours: Results, best: Results, names: list[str]) -> str:
         low, high = float(np.min(variable)), float(np.max(variable))
         if high - low > SAME * abs(high):
             unit = str(variable.attrs["units"])
-            ends = (labels.quantity(end, unit) for end in (low, high))
-            texts.append(f"{labels.words(variable)} from {' to '.join(ends)}")
+            texts.append(f"{labels.words(variable)} from {labels.between(low, high, unit)}")
     return ", ".join(texts)

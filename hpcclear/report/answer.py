@@ -43,7 +43,9 @@ def _head(of: Recommended) -> Iterator[Line]:
     ours, best = of.ours, of.best
     case = str(best["case"].item()) if "case" in best else "of the study"
     count = ours.sizes["design"]
-    yield Line("criterion", f"{merit(ours, best)} of {count} simulated designs, case {case}")
+    name = str(best["design"].item())
+    text = f"{name}: {merit(ours, best)} of {count} simulated designs, case {case}"
+    yield Line("criterion", text)
     yield from (Line("constraint", text) for text in worded(best))
     if near := alike.flat(ours, best, judged(ours)):
         yield Line("near", near)

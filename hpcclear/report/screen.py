@@ -43,7 +43,7 @@ class Tile(NamedTuple):
     change: str = ""
     """From the baseline: "-37 %"."""
     within: str = ""
-    """Half-width or interval of the value: "± 0.24 %"."""
+    """Half-width or interval of the value, not of its change: "± 0.24 %"."""
     good: bool | None = None
     """Whether the change is for the better; None where that is not decided."""
 
@@ -112,26 +112,32 @@ class Screen:
     def tables(self) -> "list[list[Sequence[str]]]":
         """Return figures and design in rows, heads first: one table where both stand beside today's, else one each."""
         if self.header[1:2] == ("today",):
-            tiles = ((t.label, t.before, t.value, t.change, t.within) for t in self.tiles)
+            tiles = ((t.label, t.before, t.value, t.within, t.change) for t in self.tiles)
             ends = (
                 f"at its {row.span.bound} bound" if row.span and row.span.bound else ""
                 for row in self.rows
             )
             design = zip(self.rows, ends, strict=True)
-            rows = [(row.label, *row.cells, "", end) for row, end in design]
-            return [[("", *self.header[1:], "change", "95 %, note"), *tiles, *rows]]
-        numbers = [(one.label, one.value, one.change, one.within) for one in self.tiles]
+            rows = [(row.label, *row.cells, end, "") for row, end in design]
+            return [[("", *self.header[1:], "95 %, note", "change"), *tiles, *rows]]
+        numbers = [(one.label, one.value, one.within) for one in self.tiles]
         rows = [(row.label, *row.cells) for row in self.rows]
         own: list[list[Sequence[str]]] = [
-            [("quantity", "value", "", "95 %, note"), *numbers],
+            [("quantity", "value", "95 %, note"), *numbers],
             [self.header, *rows],
         ]
         return [table for table in own if len(table) > 1]
 
 
-def trusted(lines: Iterable[Trust]) -> tuple[Trust, ...]:
-    """Return the lines on what to trust, red first."""
-    return tuple(sorted(lines, key=lambda one: one.level))
+def trusted(lines: Iterable[Trust], outside: bool = False) -> tuple[Trust, ...]:
+    """Return the lines on what to trust, red first; of simulations outside the range of the contact model what is green
+    holds for the model alone, and says so."""
+    found = sorted(lines, key=lambda one: one.level)
+    good = [one for one in found if one.level is Level.GREEN]
+    if outside and good:
+        text = "; ".join(f"{one.text[0].lower()}{one.text[1:]}" for one in good)
+        found[-len(good) :] = [good[0]._replace(text=f"Within the model: {text}")]
+    return tuple(found)
 
 
 def percent(share: float) -> str:

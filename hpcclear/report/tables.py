@@ -6,27 +6,24 @@ This is what leaves the program for spreadsheets, MATLAB and pandas; `hpcclear.r
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import islice, product
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.units import factor, fits, is_unit
+from hpcclear.base.units import factor, fits, is_written_in
+from hpcclear.base.written import reading, text_of, unit_for
 from hpcclear.report.figures import labels
+from hpcclear.report.html.content import scene_in
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.names import KINDS
-from hpcclear.scene.loading import QUANTITY, parse, quantities
-from hpcclear.scene.paths import flatten
 
 if TYPE_CHECKING:
     import xarray as xr
     from pandas import DataFrame
 
-MOST_UNITS = 64
-"""Units of a scene's text that its table is written in, at most: a forged text may have any number of them."""
 MOST_COLUMNS = 128
 """Columns that one variable may fill: profiles around a bearing have thousands, and stay in the result file."""
 
@@ -161,10 +158,7 @@ class Units:
     def __init__(self, content: Results, asked: Sequence[str]) -> None:
         self._si = list(asked) == [SI]
         self._asked = [] if self._si else list(asked)
-        strings = {} if self._si else _strings(str(content.attrs.get("scene", "")))
-        self._by_path = strings
-        usual = (unit for unit, _ in Counter(strings.values()).most_common() if is_unit(unit))
-        self._usual = list(islice(usual, MOST_UNITS))
+        self._scene = None if self._si else scene_in(str(content.attrs.get("scene", "")))
         known = {str(v.attrs.get("units", "")) for v in content.variables.values()}
         for unit in self._asked:
             if not any(fits(unit, one) for one in known if one not in ("", "1")):
@@ -188,29 +182,22 @@ class Units:
 
     def chosen(self, unit: str, own: Sequence[str] = ()) -> str:
         """The unit that shows quantities of a unit of SI, before which come those of a variable's own entry; "" for SI."""
-        return next((u for u in (*self._asked, *own, *self._usual) if fits(u, unit)), "")
+        with reading({} if self._scene is None else self._scene.written):
+            usual = unit_for(unit)
+        every = (*self._asked, *own, *([usual] if usual != unit else []))
+        return next((u for u in every if fits(u, unit)), "")
 
     def _own(self, variable: Variable) -> list[str]:
-        """Units of the scene's own entry of a design variable."""
-        path = str(variable.attrs.get("scene_path", ""))
-        places = (path, f"study.variables.{path}.")
-        return [
-            u for p, u in self._by_path.items() if path and (p == path or p.startswith(places[1]))
-        ]
-
-
-def _strings(text: str) -> dict[str, str]:
-    """The unit of every quantity with one in a scene's text, by its path; of overrides too."""
-    try:
-        content = dict(flatten(parse(text, "scene")))
-    except InputError:
-        return {}
-    notes = [line for line in text.splitlines() if line.startswith("# set: ")]
-    for line in notes:
-        path, _, value = line.removeprefix("# set: ").partition("=")
-        content[path.strip()] = value
-    matches = {path: QUANTITY.fullmatch(one) for path, one in quantities(content.items()).items()}
-    return {path: match[1] for path, match in matches.items() if match is not None}
+        """Units of the scene's own entry of a design variable, and of its range."""
+        path, unit = (str(variable.attrs.get(name, "")) for name in ("scene_path", "units"))
+        if self._scene is None or not path:
+            return []
+        study = self._scene.study
+        rows = [] if study is None else [one for one in study.variables if one.name == path]
+        ends = [self._scene.number(path)] if path in self._scene.numeric_paths() else []
+        ends += [end for one in rows for end in one.range or ()]
+        with reading(self._scene.written):
+            return [own for end in ends if (own := is_written_in(text_of(end, unit)))]
 
 
 def _words(variable: Variable) -> np.ndarray:

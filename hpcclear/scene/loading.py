@@ -4,7 +4,7 @@ import ast
 import itertools
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import tomli_w
@@ -28,8 +28,6 @@ _DOTTED = re.compile(
 
 
 _NOTE = "# set: "  # before each override, at the head of a scene's text
-QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
-"""A number with its unit."""
 _CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
@@ -86,16 +84,6 @@ def load_scene(
         below = "\n\n" + tomli_w.dumps(plugins, multiline_strings=True) if plugins else ""
         scene._text = notes + own + below
     return scene
-
-
-def quantities(entries: Iterable[tuple[str, object]]) -> dict[str, str]:
-    """Return the text of every quantity with its unit among entries (path, value), by its path; in a list by its place."""
-    found = {}
-    for path, value in entries:
-        for k, one in enumerate(value if isinstance(value, list) else [value]):
-            if isinstance(one, str) and one.isprintable() and QUANTITY.fullmatch(one.strip(" \"'")):
-                found[f"{path}.{k}" if isinstance(value, list) else path] = one.strip(" \"'")
-    return found
 
 
 def scene_of_text(text: str, name: str) -> Scene:

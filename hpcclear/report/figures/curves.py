@@ -18,6 +18,8 @@ HEIGHT = 26.0
 """mm of one curve."""
 _FEW = 40
 """Rows of a table up to which each is marked."""
+_POINTS = 200
+"""Points of a small drawing, about."""
 _TURNING = labels.Scale(float(np.degrees(1.0)), "°")
 _BY = {"time": labels.Scale(1.0, "s"), "speed": labels.Scale(30.0 / np.pi, "rpm")}
 """Units in which what rows go by is shown; angles in `_TURNING`."""
@@ -74,6 +76,15 @@ def tabulated(scene: Scene) -> list[Tabulated]:
     return [one._replace(key=scene.path_in_scene(one.key)) for one in found]
 
 
+def outline(curve: Tabulated) -> str:
+    """Return a small drawing of a curve: the points of an SVG polyline, 100 wide and 24 high."""
+    found = np.array(curve.rows).T if curve.acting is None else np.array(_drawn(curve.acting))
+    found = found[:, :: max(1, found.shape[1] // _POINTS)]
+    reach = np.ptp(found, axis=1, keepdims=True)
+    shares = (found - found.min(axis=1, keepdims=True)) / np.where(reach > 0.0, reach, 1.0)
+    return " ".join(f"{100 * x:.1f},{24 - 24 * y:.1f}" for x, y in shares.T)
+
+
 @style.drawn
 def tables_figure(response: Results) -> "style.Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
@@ -122,7 +133,7 @@ def _curve(axes: "style.Axes", curve: Tabulated) -> None:
     if len(curve.rows) <= _FEW:
         axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.colour("green"))
     axes.set_xlabel(by.label(curve.over), labelpad=1.0)
-    axes.set_title(labels.literal(shown.label(curve.key)), pad=2.0)
+    axes.set_title(labels.literal(shown.label(labels.entry(curve.key))), pad=2.0)
 
 
 def _drawn(curve: Pieces) -> tuple[Array, Array]:

@@ -1,8 +1,7 @@
 """Figures of the optimised designs: fronts, and responses beside each other."""
 
 import itertools
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -192,14 +191,12 @@ def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 @style.drawn
 def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
-    """Responses over the last two revolutions of optimised designs beside the baseline design's, α left and β right (the
-    paper's Fig. 10), further ends behind them.
+    """Responses of designs over the last two revolutions, that of the baseline design first (the paper's Fig. 10).
 
     Parameters
     ----------
     responses : mapping of str to xarray.Dataset
-        Kind ``response``, by the name of the design: names with ``alpha`` go left, with ``beta`` right, names without an
-        end are drawn in all columns as what to compare with.
+        Kind ``response``, by the name of the design.
 
     Raises
     ------
@@ -209,62 +206,25 @@ def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
     if not responses:
         reason = "there is no response to draw"
         raise InputError("responses", 0, reason, "Give the response of each design")
-    columns = _columns(list(responses))
-    quantities = motion.quantities(next(iter(responses.values())))
-    height = 24.0 + 33.0 * len(quantities)
-    figure, axes = style.grid(len(quantities), len(columns), height, sharex=True, sharey="row")
-    shown = {name: motion.latest(response) for name, response in responses.items()}
-    order = sorted(responses, key=lambda name: (end_of(name) != "", name))
-    kinds = list(dict.fromkeys(_kind(name) for name in order))
-    for line, (name, joint, words) in zip(axes, quantities, strict=True):
+    order = sorted(responses, key=lambda name: (name != "original", name))
+    shown = {name: motion.latest(responses[name]) for name in order}
+    quantities = motion.quantities(shown[order[0]])
+    figure, axes = style.grid(len(quantities), 1, 24.0 + 33.0 * len(quantities), sharex=True)
+    for panel, (name, joint, words) in zip(axes[:, 0], quantities, strict=True):
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
-        unit = labels.scale(
-            str(next(iter(series.values())).attrs["units"]),
-            [float(np.nanmax(abs(s.to_numpy()))) for s in series.values()],
-        )
-        for panel, members in zip(line, columns.values(), strict=True):
-            for design in (d for d in order if d in members):
-                k = kinds.index(_kind(design))
-                turn = motion.turns(shown[design])
-                text = labels.literal("baseline" if _kind(design) == "original" else _kind(design))
-                look: style.Look = {
-                    "color": style.colour((k - 1) % len(style.NAMES)),
-                    "label": text,
-                }
-                look |= {"lw": 0.7, "ls": style.DASHES[k % len(style.DASHES)]}
-                panel.plot(turn - turn[0], unit(series[design]), **look)
-        line[0].set_ylabel(unit.label(words))
-    for panel, title in zip(axes[0], columns, strict=True):
-        panel.set_title(title)
-    for panel in axes[-1]:
-        label = motion.turns_label(next(iter(shown.values())))
-        panel.set_xlabel(label.replace("revolutions", "rev."))
+        largest = [float(np.nanmax(abs(one.to_numpy()))) for one in series.values()]
+        unit = labels.scale(str(series[order[0]].attrs["units"]), largest)
+        for k, design in enumerate(order):
+            turn = motion.turns(shown[design])
+            text = labels.literal("baseline" if design == "original" else design)
+            look: style.Look = {"color": style.colour((k - 1) % len(style.NAMES)), "label": text}
+            look |= {"lw": 0.7, "ls": style.DASHES[k % len(style.DASHES)]}
+            panel.plot(turn - turn[0], unit(series[design]), **look)
+        panel.set_ylabel(unit.label(words))
+    axes[-1, 0].set_xlabel(motion.turns_label(shown[order[0]]))
     style.legend(figure, axes[0], "lower", columnspacing=1.0)
     figure.align_ylabels(axes[:, 0])
     return figure
-
-
-def _columns(names: Sequence[str]) -> dict[str, list[str]]:
-    """Which designs each column of the comparison shows, by its title."""
-    base = [name for name in names if not end_of(name)]
-    found = {}
-    for word, letter in zip(ENDS, _GREEK, strict=True):
-        members = [name for name in names if end_of(name) == word]
-        if members:
-            found[f"solution {letter}"] = base + members
-    return found or {"": base}
-
-
-def _kind(name: str) -> str:
-    """A design's name without α or β: what has the same colour in all columns."""
-    before, _, behind = name.rpartition(end_of(name)) if end_of(name) else ("", "", name)
-    return f"{before}{behind}".strip(" _-.,") or name
-
-
-def end_of(name: str) -> str:
-    """Which end of a front a design is by its name: "alpha", "beta" and so on; "" for none."""
-    words = re.split(r"[\s_.,-]+", name)
-    return next((word for word in reversed(words) if word in ENDS), "")
 
 
 PARTS = (

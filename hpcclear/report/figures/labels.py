@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import NamedTuple
@@ -27,8 +27,8 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 FLAGS = {
-    Flag.LATCHED: "a joint stayed in contact for a whole revolution, and its damping still uses the last impact velocity: "
-    "results may depend on the integration tolerance; the law hunt-crossley avoids it",
+    Flag.LATCHED: "a joint stayed in contact for a whole revolution: its damping uses the last impact velocity, and "
+    "results may depend on the integration tolerance (hunt-crossley avoids it)",
     Flag.BEYOND_HERTZ: "indentation beyond the range of the contact law (Hertz: 25 % of the clearance): forces are indicative",
     Flag.STIFF: "the implicit method was used for part of the run",
 }
@@ -127,13 +127,21 @@ def value(one: Variable) -> str:
     return quantity(number, str(one.attrs["units"]))
 
 
+def quantities(values: Sequence[float], units: str, digits: int = 4) -> list[str]:
+    """Numbers as `quantity` prints them, in one unit where they stand beside each other."""
+    texts = [quantity(one, units, digits) for one in values]
+    if len({text.partition(" ")[2] for text in texts if text != "–"}) < 2:
+        return texts
+    chosen = scale(units, values)
+    shown = (f"{one * chosen.factor:.{digits}g} {chosen.unit}" for one in values)
+    return [text if np.isfinite(one) else "–" for text, one in zip(shown, values, strict=True)]
+
+
 def alike(*ones: Variable) -> list[str]:
     """A design variable of several designs as it is printed, in one unit."""
-    texts, units = [value(one) for one in ones], str(ones[0].attrs["units"])
-    if options(ones[0]) or len({text.split(" ")[-1] for text in texts if text != "–"}) < 2:
-        return texts
-    chosen = scale(units, [float(one) for one in ones])
-    return [f"{float(one) * chosen.factor:.4g} {chosen.unit}" for one in ones]
+    if options(ones[0]):
+        return [value(one) for one in ones]
+    return quantities([float(one) for one in ones], str(ones[0].attrs["units"]))
 
 
 def options(variable: Variable) -> list[str]:
@@ -174,7 +182,7 @@ def paired(value: float, half_width: float) -> str:
 def between(low: float, high: float, units: str) -> str:
     """Return the ends of an interval in words, with enough digits to differ."""
     for digits in range(4, 8):
-        ends = quantity(low, units, digits), quantity(high, units, digits)
+        ends = quantities((low, high), units, digits)
         if ends[0] != ends[1]:
             break
     return " to ".join(ends)
@@ -234,6 +242,15 @@ def noted(path: str, words: str) -> str:
 def objective(content: Results) -> str:
     """What f is in a file of results, in words."""
     return str(content.attrs.get("objective", MEAN_GAP.words))
+
+
+def sentence(text: str, content: Results) -> str:
+    """A sentence that says what f is where it comes first, and does without " of f" from then on."""
+    words = re.split(", of | between ", objective(content))[0]
+    first = r"\b(?:mean of )?f\b" if words.startswith("mean ") else r"\bf\b"
+    head, *rest = re.split(first, text, maxsplit=1)
+    said = words.join([head, *(re.sub(r" of f\b", "", one) for one in rest)])
+    return f"{said[:1].upper()}{said[1:]}"
 
 
 def design_variables(content: Results) -> list[Variable]:

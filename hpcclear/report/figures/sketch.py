@@ -129,7 +129,7 @@ def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:
         row = _ROW.fullmatch(scene.path_in_linkage(path))
         pair, unit = (before.number(path), scene.number(path)), scene.unit(path)
         if row and not np.isclose(*pair, rtol=1e-9, atol=0.0):
-            said = " → ".join(labels.quantity(one, unit) for one in pair)
+            said = " → ".join(labels.quantities(pair, unit))
             found.setdefault(row[1], []).append(f"{re.sub('[_.]', ' ', row[2])} {said}")
     return {name: sorted(said) for name, said in sorted(found.items())}
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import ENDS
 from hpcclear.report.figures import catalogue, designs, labels, motion, response, sketch, style
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
@@ -82,27 +81,21 @@ def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], F
 def _of_responses(
     found: Mapping[str, Results], best: str
 ) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
-    for first in range(0, len(ENDS), 2):  # two columns a picture
-        pair = ENDS[first : first + 2]
-        shown = {name: r for name, r in found.items() if designs.end_of(name) in ("", *pair)}
-        asked = first == 0 or any(designs.end_of(name) for name in shown)
-        if asked and len(shown) > 1:
-            caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
-            yield (
-                "comparison",
-                "response",
-                caption,
-                functools.partial(designs.comparison_figure, shown),
-            )
     if not found:
         return
+    titles = {"original": "original", best: "recommended"} if best in found else {}
+    shown = {titles[name]: found[name] for name in titles if name in found} or found
+    if len(shown) > 1:
+        caption = f"Responses of the designs, two revolutions{_clearances(*shown.values())}."
+        draw = functools.partial(designs.comparison_figure, shown)
+        yield "comparison", "response", caption, draw
     design, before = found.get(best), found.get("original")
     if design is None or design is before:
         design, before = before or next(iter(found.values())), None
     caption = "The mechanism to scale, with its dimensions."
     if before is not None:
         caption = (
-            f"{best}: parts that differ from the baseline design in orange, its outline dashed."
+            "Recommended design: parts that differ from the baseline in orange, its outline dashed."
         )
     draw = functools.partial(sketch.mechanism_figure, design, before)
     yield MECHANISM, "response", caption, draw

@@ -17,9 +17,11 @@ from hpcclear.results.content import Results
 
 def loads(content: Content) -> list[object] | None:
     """Return tables of the bearings of every stored response, torque, impacts, then remarks; None without any."""
-    every = content.responses
     verified = content.get("verification")
-    chosen = ("original", recommended(verified)) if verified is not None else ()
+    best = "" if verified is None else recommended(verified)
+    titles = {best: "recommended", "original": "baseline"}
+    every = {titles.get(name, name): one for name, one in content.responses.items()}
+    chosen = titles.values() if best else ()
     shown = {name: one for name, one in every.items() if name in chosen} or every
     valid = {name: one for name, one in shown.items() if Status(int(one["status"])).valid}
     found = {name: bearings.bearings(one) for name, one in valid.items()}
@@ -31,16 +33,14 @@ def loads(content: Content) -> list[object] | None:
         rows = [_whole(name, one) for name, one in valid.items()]
         parts.append(_table(header, rows, "Drive and objective"))
     impacts = [
-        [_title(name), joint, *map(Number, cells)]
+        [name, joint, *map(Number, cells)]
         for name, one in valid.items()
         for joint, *cells in noise.joints(one)
     ]
     if impacts:
         parts.append(_table(["response", *noise.HEADER], impacts, noise.TITLE))
     further = [
-        [_title(name), *row]
-        for name, one in valid.items()
-        for row in _further(one, len(valid) == 1)
+        [name, *row] for name, one in valid.items() for row in _further(one, len(valid) == 1)
     ]
     if further:
         parts.append(_table(["response", "quantity", "value"], further, "Further results"))
@@ -60,7 +60,7 @@ def _remarks(shown: Mapping[str, Results]) -> list[str]:
     every = len(shown)
 
     def of(names: list[str]) -> str:
-        where = "all responses" if len(names) == every else ", ".join(map(_title, names))
+        where = "all responses" if len(names) == every else ", ".join(names)
         return f" ({where})" if every > 1 else ""
 
     return [f"{label}{of(names)}: {text}." for (label, text), names in found.items()]
@@ -87,14 +87,9 @@ def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: 
     return PageTable(header[first:], [row[first:] for row in rows], caption)
 
 
-def _title(name: str) -> str:
-    """A response by the name of its design."""
-    return "baseline" if name == "original" else name
-
-
 def _row(name: str, one: bearings.Bearing) -> list[object]:
     return [
-        _title(name), bearings.named(one.joint), quantity(one.peak, "N"), Number(bearings.degrees(one)),
+        name, bearings.named(one.joint), quantity(one.peak, "N"), Number(bearings.degrees(one)),
         quantity(one.mean, "N"), Number(bearings.share(one.contact)), quantity(one.gap, "m"),
     ]  # fmt: skip
 
@@ -103,7 +98,7 @@ def _whole(name: str, found: Results) -> list[object]:
     drive = bearings.torque(found)
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
     return [
-        _title(name),
+        name,
         quantity(drive.peak, "N m"),
         quantity(drive.mean, "N m"),
         Number(labels.with_half_width(f, half_width(found), unit)),

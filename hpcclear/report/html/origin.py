@@ -1,13 +1,42 @@
 """The sections of the page on where results come from: scene, time of the ranks, how to do it again."""
 
+import re
+
 import numpy as np
 
-from hpcclear.report.html.content import Content
+from hpcclear.report.figures import curves, labels
+from hpcclear.report.html.content import Content, scene_in
 from hpcclear.report.html.markup import PageTable, download, number, preformatted
 from hpcclear.report.parts import SectionOf
 
 _PARTS = {"busy": "computing", "idle": "waiting", "compile": "compiling", "write": "writing"}
 """What a rank spends time on, variables of kind ``timing``, in words."""
+
+
+_READ = re.compile(r"(?:# )?(\S+): '(.+?)' is read as (.+)")
+"""A note on how an entry of a scene was read: its path, what was written, and what that means."""
+
+
+def inputs(content: Content) -> list[object] | None:
+    """Fits, files and curves of the scene by their names, curves with a small drawing."""
+    text = content.attribute("scene")
+    if (scene := scene_in(text)) is None:
+        return None
+    notes = map(_READ.fullmatch, (*scene.readings, *text.splitlines()))
+    read = {one[1]: one for one in notes if one is not None}
+    rows: list[list[object]] = []
+    for one in curves.tabulated(scene):
+        name = read.pop(one.key)[2] if one.key in read else f"{len(one.rows)} points"
+        values = [value for _, value in one.rows]
+        words = labels.between(min(values), max(values), one.unit)
+        drawn = {"kind": "curve", "words": words, "points": curves.outline(one)}
+        rows.append([labels.entry(one.key), name, drawn])
+    rows += [[labels.entry(path), one[2], one[3]] for path, one in read.items()]
+    return (
+        [PageTable(["entry", "as written", "value"], rows, "Fits, files and curves")]
+        if rows
+        else None
+    )
 
 
 def scene(content: Content) -> list[object] | None:
@@ -62,6 +91,7 @@ def reproduce(content: Content) -> list[object]:
 
 PARTS = (
     SectionOf(10, "reproduce", "origin", "Versions and command", reproduce, each=True),
+    SectionOf(15, "reproduce", "inputs", "Inputs", inputs, each=True),
     SectionOf(20, "reproduce", "scene", "Scene", scene, each=True),
     SectionOf(30, "reproduce", "time", "Run time of the ranks", timing),
 )

@@ -5,6 +5,7 @@
   const content = JSON.parse(document.getElementById("content").textContent);
   const SVG = "http://www.w3.org/2000/svg";
   const byId = (id) => document.getElementById(id);
+  const called = (name) => name === "original" ? "baseline" : name === content.front.recommended ? `recommended (${name})` : name;
 
   function draw(parent, name, attributes = {}, text = null) {
     const element = document.createElementNS(SVG, name);
@@ -87,7 +88,7 @@
 
   function describe(panel, point) {
     panel.replaceChildren();
-    put(panel, "h3", point.case && !point.name.startsWith(point.case) ? `${point.case}: ${point.name}` : point.name);
+    put(panel, "h3", point.case && !point.name.startsWith(point.case) ? `${point.case}: ${point.name}` : called(point.name));
     list(panel, "Design", point.design);
     list(panel, "By the surrogate", point.surrogate);
   }
@@ -117,7 +118,7 @@
     const one = content.responses[point.response];
     const base = point.response === "original" ? null : content.responses.original;
     if (one) {
-      put(below, "h3", `Responses of ${point.name}${base ? " (grey: the baseline design)" : ""}`);
+      put(below, "h3", `Responses of ${called(point.name)}${base ? " (grey: the baseline design)" : ""}`);
       const charts = put(below, "div", null, { class: "charts" });
       one.forEach((curve, k) => chart(charts, curve, base ? base[k] : null));
     } else {
@@ -251,7 +252,7 @@
     if (!place || !names.length) return;
     const select = byId("motion-name"), button = byId("motion-play"), gain = byId("motion-gain");
     const at = byId("motion-at"), out = byId("motion-text"), speed = byId("motion-speed");
-    for (const name of names) put(select, "option", name === "original" ? "baseline" : name, { value: name });
+    for (const name of names) put(select, "option", called(name), { value: name });
     const svg = draw(place, "svg", { role: "img" });
     svg.setAttribute("aria-label", "The mechanism, its clearances drawn larger than they are");
     let shapes = {}, motion = null, frame = 0, playing = false, last = 0, strongest = 1, l = 1;

@@ -24,15 +24,17 @@ def readings(content: Content) -> list[object] | None:
     found = content.get("readings")
     if found is None:
         return None
-    readings = found["reading"].to_numpy()
-    distances = found["distance"].to_numpy() if "distance" in found else [np.nan] * len(readings)
-    rows = [[str(one), number(far, 3)] for one, far in zip(readings, distances, strict=True)]
-    words = (
-        "By how the paper's text is read, the means of f of its designs differ from the printed ones: root mean square of "
-        "ln(mean / printed mean)."
+    far = found["distance"].to_numpy() if "distance" in found else np.array([])
+    if not np.isfinite(far).any():
+        return None
+    ends = {"nearest": int(np.nanargmin(far)), "farthest": int(np.nanargmax(far))}
+    said = (
+        f"{word} ({number(far[k], 3)}): {found['reading'].to_numpy()[k]}"
+        for word, k in ends.items()
     )
-    table = PageTable(["reading", "distance"], rows, "Effect of ambiguities in the paper")
-    return [words, table]
+    return [
+        f"Of {len(far)} readings of the paper's text, by the root mean square of ln(mean / printed mean): {'; '.join(said)}."
+    ]
 
 
 def claims(content: Content) -> list[object] | None:

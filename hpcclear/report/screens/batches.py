@@ -55,11 +55,9 @@ def samples(content: Content) -> Screen | None:
     if not np.isfinite(f).any():
         headline = "Every simulation failed"
     elif "mean of f" in shown:
-        headline = (
-            f"f = {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
-        )
+        headline = f"mean of f {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
     else:
-        headline = f"f = {labels.quantity(float(np.nanmean(f)), unit)}"
+        headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"
     rows = [
         ScreenRow(line.label, (line.text.partition(" (")[0], _interval(line)))
         for line in shown.values()
@@ -73,13 +71,13 @@ def samples(content: Content) -> Screen | None:
         rows.insert(0, ScreenRow("range of f", (" to ".join(ends), "")))
     share = _share(found, Flag.BEYOND_HERTZ)
     return Screen(
-        headline,
+        labels.sentence(headline, found),
         about,
         "the contact model is outside its range" if share > MOST else "",
         tiles,
         ("statistic", "value", "95 % CI") if rows else (),
         tuple(rows),
-        trust=trusted(_trust(found)),
+        trust=trusted(_trust(found), share > MOST),
         figures=("samples",),
     )
 
@@ -180,7 +178,8 @@ def map_of_motion(content: Content) -> Screen | None:
     return Screen(
         headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
         "the contact model is outside its range" if share > MOST else "",
-        tuple(tiles[:4]), ("motion", "cells") if rows else (), rows, trust=trusted(trust), figures=("map",),
+        tuple(tiles[:4]), ("motion", "cells") if rows else (), rows, trust=trusted(trust, share > MOST),
+        figures=("map",),
     )  # fmt: skip
 
 
@@ -221,7 +220,7 @@ def statistics(content: Content) -> Screen | None:
         unit = str(found["objective_mean"].attrs["units"])
         error = labels.quantity(deviation / number**0.5, unit, 2)
         shown = labels.quantity(mean, unit, 6), labels.quantity(deviation, unit)
-        headline = f"Mean of f {shown[0]}, standard deviation {shown[1]}"
+        headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
         tiles.append(Tile("mean of f", shown[0], within=f"standard error {error}"))
         tiles.append(Tile("std. deviation of f", shown[1]))
     lost = Trust(
@@ -231,7 +230,7 @@ def statistics(content: Content) -> Screen | None:
     )
     single = Trust(Level.AMBER, "The half-width of a single f was not checked", "quality")
     return Screen(
-        headline,
+        labels.sentence(headline, found),
         (f"f: {labels.objective(found)}",),
         tiles=tuple(tiles),
         trust=trusted([lost, single]),

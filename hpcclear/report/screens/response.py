@@ -52,7 +52,7 @@ def screen(content: Content) -> Screen | None:
             )
             for one in loads
         ),
-        trust=trusted(_trust(response, loads)),
+        trust=trusted(_trust(response, loads), bool(flags & Flag.BEYOND_HERTZ)),
         steps=tuple(_steps(response)),
         figures=("response", "orbit") if loads else ("response",),
     )
@@ -61,11 +61,12 @@ def screen(content: Content) -> Screen | None:
 def _headline(response: Results, loads: Sequence[bearings.Bearing]) -> str:
     """The largest force and where it acts, and f."""
     unit = str(response["objective"].attrs["units"])
-    f = f"f = {labels.quantity(float(response['objective']), unit)}"
+    f = f"f {labels.quantity(float(response['objective']), unit)}"
     if not loads:
-        return f
+        return labels.sentence(f, response)
     worst = max(loads, key=lambda one: one.peak)
-    return f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {bearings.named(worst.joint)}; {f}"
+    peak = f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {bearings.named(worst.joint)}"
+    return labels.sentence(f"{peak}; {f}", response)
 
 
 def half_width(response: Results) -> float:

@@ -76,14 +76,14 @@ def screen(content: Content) -> Screen | None:
     infeasible = verdict_of(best) in _INFEASIBLE
     column = "nearest" if infeasible else "today, kept" if kept else "recommended"
     return Screen(
-        _headline(of, tiles, kept),
+        _headline(best, tiles, kept),
         tuple(_about(of)),
         _doubt(of),
         tuple(tiles),
         ("design", *(("today",) if base is not None and not kept else ()), column),
         rows,
         _remark(of),
-        trusted(_trust(of)),
+        trusted(_trust(of), beyond_hertz(best) > MANY),
         tuple(bars),
         causes,
         tuple(steps(of)),
@@ -96,14 +96,14 @@ def _readable(one: Results) -> str:
     return str(one["design"].item())
 
 
-def _headline(of: Recommended, tiles: list[Tile], kept: bool) -> str:
-    name, found = _readable(of.best), verdict_of(of.best)
-    if found in _INFEASIBLE:
-        return f"{_INFEASIBLE[found]}. Nearest: {name}"
+def _headline(best: Results, tiles: list[Tile], kept: bool) -> str:
+    if (found := verdict_of(best)) in _INFEASIBLE:
+        return _INFEASIBLE[found]
     if kept:
         return "Keep today's design: no simulated design is better"
     said = [f"{lower(one.change)} {one.label}" for one in tiles[:2] if lower(one.change)]
-    return f"Design {name}: {', '.join(said) or 'no significant change'}"
+    text = f"Recommended design: {', '.join(said) or 'no significant change'}"
+    return labels.sentence(text, best)
 
 
 def _doubt(of: Recommended) -> str:
@@ -164,9 +164,9 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
         unit, mine = unit_of(best, stem if stem in best else f"{stem}_true"), _ends(best, stem)
         before = None if base is None else _ends(base, stem)
         moved, good = ("", None) if before is None else change(mine, before)
-        old = "" if before is None else labels.quantity(before[0], unit)
+        value, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
-            yield Tile(words, labels.quantity(mine[0], unit), old, moved, within(*mine, unit), good)
+            yield Tile(words, value, "".join(old), moved, within(*mine, unit), good)
     yield from _peaks(best, base, content)
 
 
@@ -191,10 +191,8 @@ def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Ti
     ]
     if np.isfinite(forces[0]):
         moved = change((forces[0], np.nan, np.nan), (forces[1], np.nan, np.nan))
-        old = labels.quantity(forces[1], "N") if np.isfinite(forces[1]) else ""
-        yield Tile(
-            "peak force", labels.quantity(forces[0], "N"), old, moved[0], "one run", moved[1]
-        )
+        value, old = labels.quantities(forces, "N")
+        yield Tile("peak force", value, old.strip("–"), moved[0], "one run", moved[1])
 
 
 def _constraints(best: Results) -> Iterator[Results]:
@@ -267,14 +265,14 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     share = beyond_hertz(best)
     if share > MANY:
         level = Level.RED if share > MOST else Level.AMBER
-        text = f"Contact model outside its range ({100 * share:.0f} % of runs)"
+        runs = "all runs" if share == 1.0 else f"{100 * share:.0f} % of runs"
+        text = f"Contact model outside its range ({runs})"
         yield Trust(level, text, "bearings")
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
-        many = "all" if moved.all() else f"{int(moved.sum())} of {moved.size}"
-        text = f"Chaotic motion in {many} designs: values are means"
-        yield Trust(Level.AMBER, text, "quality")
+        many = "" if moved.all() else f" in {int(moved.sum())} of {moved.size} designs"
+        yield Trust(Level.AMBER, f"Chaotic motion{many}: values are means", "quality")
     yield from _failures(of)
     errors = surrogate_errors(best)
     if any(abs(error) > FAR for error in errors):
@@ -304,6 +302,10 @@ def _accuracy(best: Results) -> Trust:
     """The half-widths of mean and standard deviation, and whether they are those that were requested."""
     if missed := _missed(best):
         return Trust(Level.RED, f"Requested accuracy not reached: {missed}", "quality")
+    scene = scene_in(str(best.attrs.get("scene", "")))
+    asked = scene.study.accuracy if scene is not None and scene.study is not None else None
+    if asked is not None and "accuracy_missed" in best:
+        return Trust(Level.GREEN, "Requested accuracy reached", "quality")
     known = []
     for stem in ("mean", "deviation"):
         value, low, high = _ends(best, stem)

@@ -1,0 +1,101 @@
+"""How long the answers of all commands are: lines and columns that each prints, beside those of another version.
+
+    python analysis/terminal.py [--before PROGRAM]
+
+PROGRAM is the Python of an environment with the other version. Runs short jobs, prints a row a command, and writes
+``analysis/results/terminal.csv``. What a terminal shows counts, notes and the last line of progress as well. Help is left out.
+"""
+
+import argparse
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from recorded import record
+
+ROOT = Path(__file__).resolve().parent.parent
+LINES, COLUMNS = 24, 80
+SHORT = (
+    "--set numerics.transient_revolutions=2 --set numerics.averaged_revolutions=2 "
+    "--set numerics.rtol=1e-4"
+)
+STUDY = (
+    "--set study.samples=40 --set study.test_samples=10 --set study.accuracy.mean=0.1 --set study.accuracy.deviation=0.2 "
+    "--set study.sensitivity.levels=2 --set study.sensitivity.sobol_samples=32"
+)
+COMMANDS = (
+    "init starter.toml",
+    "init compressor.toml --compressor",
+    "check JOBS/quickstart.toml --no-cost",
+    "check JOBS/compressor.toml --no-cost",
+    "check JOBS/tolerances.toml --no-cost",
+    "check JOBS/linkages/v_twin.toml --no-cost",
+    "show laws",
+    "show schema",
+    "show citation",
+    f"simulate JOBS/slider_crank.toml -o response/response.nc {SHORT}",
+    f"simulate JOBS/linkages/v_twin.toml -o response/v_twin.nc {SHORT}",
+    f"sample JOBS/quickstart.toml -o samples/samples.nc --set study.samples=32 {SHORT}",
+    f"map JOBS/quickstart.toml --x C=0.3mm:1mm:3 --y m3=0.1:0.2:3 -o map.nc {SHORT}",
+    f"wear JOBS/wear.toml -o wear.nc --set wear.lives=4 {SHORT}",
+    f"effects JOBS/slider_crank.toml --tolerance 10% -o effects.nc {SHORT}",
+    f"run JOBS/quickstart.toml -o study {STUDY} {SHORT}",
+    "accuracy JOBS/quickstart.toml --plan",
+    "report response",
+    "plot response/response.nc -o figures",
+    "export samples/samples.nc -o samples.csv",
+    "export response/response.nc -o response.csv",
+    "compare JOBS/slider_crank.toml response.csv",
+    "reproduce study --crate",
+)
+"""Commands in the order in which later ones need files of earlier ones."""
+
+
+def extent(text: str) -> tuple[int, int]:
+    """Lines and columns on a terminal: of a line that is drawn again only its last state is left."""
+    lines = [line.rsplit("\r", 1)[-1] for line in text.rstrip().splitlines()]
+    return len(lines), max(map(len, lines), default=0)
+
+
+def answers(program: str) -> dict[str, tuple[int, int]]:
+    """What each command prints, by the command; nothing of one that failed."""
+    found = {}
+    with tempfile.TemporaryDirectory() as place:
+        for command in COMMANDS:
+            words = shlex.split(command.replace("JOBS", str(ROOT / "jobs")))
+            done = subprocess.run(
+                [program, "-m", "hpcclear", *words],
+                cwd=place, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+            )  # fmt: skip
+            if done.returncode not in (0, 4):
+                print(f"{command}: exit code {done.returncode}\n{done.stdout}", file=sys.stderr)
+                continue
+            found[command] = extent(done.stdout)
+            print(*found[command], command, flush=True)
+    return found
+
+
+def main() -> None:
+    """Measure, compare, record."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--before", metavar="PROGRAM")
+    options = parser.parse_args()
+    now, then = answers(sys.executable), answers(options.before) if options.before else {}
+    rows = [
+        (
+            command.split(" --set")[0].replace("JOBS", "jobs"),
+            *then.get(command, ("", ""))[:1],
+            *now[command],
+        )
+        for command in now
+    ]
+    record("terminal", [("command", "lines before", "lines", "columns"), *rows])
+    for command, (lines, columns) in now.items():
+        if lines > LINES or columns > COLUMNS:
+            print(f"too long: {command}: {lines} lines, {columns} columns")
+
+
+if __name__ == "__main__":
+    main()
