@@ -44,7 +44,7 @@ def lines_of(place: Path) -> dict[str, str]:
     """What the first screen of a study says: headline, figures with their intervals, values of the design."""
     first = screen_of(read(place))
     assert first is not None
-    values = ", ".join(f"{row.label} = {row.cells[-1]}" for row in first.rows)
+    values = ", ".join(f"{row.label.partition(',')[0]} = {row.cells[-1]}" for row in first.rows)
     shown = {"answer": first.headline, "doubt": first.doubt, "values": values}
     for tile in first.tiles:
         moved = f", {tile.change} from {tile.before}" if tile.change else ""

@@ -30,20 +30,12 @@ class Output(NamedTuple):
     """Page with the command; others may show its output as well."""
     words: str
     """Words by which the command is found on it."""
-    kept: str = "(?!written|report)"
-    """What the lines that are shown begin with."""
-    options: str = ""
-    """Further options."""
 
 
 OUTPUTS = {
     "tutorial": Output("tutorial.md", "run jobs/quickstart.toml"),
     "effects": Output("how-to/effects.md", "effects jobs/slider_crank.toml"),
     "identify": Output("how-to/identify.md", "identify jobs/identify.toml --signal measured.csv"),
-    "tolerances": Output("how-to/tolerances.md", "run jobs/tolerances.toml"),
-    "decisions": Output(
-        "how-to/tolerances.md", "run jobs/tolerances.toml", "(constraint|tolerances) ", "--details"
-    ),
 }
 
 
@@ -62,8 +54,7 @@ def printed(name: str, results: Path) -> str:
             subprocess.run([sys.executable, "-c", code], cwd=results, check=True)
         for line in block.text.replace("\\\n", " ").splitlines():
             if block.language == "bash" and one.words in " ".join(line.split()):
-                command = f"{line.partition('hpcclear ')[2]} {one.options}"
-                command = command.replace("jobs/", f"{ROOT}/jobs/")
+                command = line.partition("hpcclear ")[2].replace("jobs/", f"{ROOT}/jobs/")
                 return _run(f"{sys.executable} -m hpcclear {command}", results)
     raise LookupError(f"{one.page} has no command with {one.words}")
 
@@ -73,11 +64,10 @@ def _run(command: str, place: Path) -> str:
     return done.stdout.decode()
 
 
-def shown(name: str, text: str) -> str:
-    """The lines of an output that pages show; lines that a table's cell goes on in belong to its first."""
+def shown(text: str) -> str:
+    """The lines of an output that pages show: without those on files, whose places differ."""
     lines = [line.rstrip() for line in text.splitlines()]
-    kept = [line for line in lines if re.match(OUTPUTS[name].kept, line.strip())]
-    return "\n".join(kept).strip() + "\n"
+    return "\n".join(one for one in lines if not one.startswith("written")).strip() + "\n"
 
 
 def filled(page: Path) -> str:
@@ -98,7 +88,7 @@ def main() -> None:
     options = parser.parse_args()
     options.results.mkdir(parents=True, exist_ok=True)
     for name in options.names or OUTPUTS:
-        place_of(name).write_text(shown(name, printed(name, options.results)), encoding="utf-8")
+        place_of(name).write_text(shown(printed(name, options.results)), encoding="utf-8")
     for page in sorted(DOCS.rglob("*.md")):
         page.write_text(filled(page), encoding="utf-8")
 

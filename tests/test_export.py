@@ -54,7 +54,7 @@ def test_a_sample_has_one_row_with_its_joints_as_columns_and_words_for_codes():
     ("overrides", "units", "heading", "factor"),
     [
         ([], (), "C [mm]", 1e3),
-        (['study.variables.C={range=["300 um", "1 mm"]}'], (), "C [um]", 1e6),
+        (['study.variables.C={range=["290 um", "1 mm"]}'], (), "C [um]", 1e6),
         (
             ["study.variables.C={range=[3e-4, 1e-3]}", "study.random.C.range=[3e-4, 1e-3]"],
             (),

@@ -85,15 +85,15 @@ def effects(content: Content) -> Screen | None:
             screening.label(screening.named(found, k)),
             (
                 screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0])),
-                screening.saving(found, k, seconds).words,
                 verdicts[int(found["decision"][k])],
+                screening.saving(found, k, seconds).words,
             ),
         )
         for k in range(1, found.sizes["variant"])
     )
     return Screen(
         headline, (f"f: {labels.objective(found)}", f"{int(np.sum(found['samples'].to_numpy()))} simulations"),
-        header=("disabled", "change of f", "run time saved", "within"), rows=rows,
+        header=("disabled", "change of f", "within", "run time saved"), rows=rows,
         trust=trusted(_screened(found)), figures=("effects",),
         steps=("--scene FILE writes the scene without them",) if chosen else (),
     )  # fmt: skip
