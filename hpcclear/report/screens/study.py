@@ -164,9 +164,9 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
         unit, mine = unit_of(best, stem if stem in best else f"{stem}_true"), _ends(best, stem)
         before = None if base is None else _ends(base, stem)
         moved, good = ("", None) if before is None else change(mine, before)
-        value, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
+        shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
-            yield Tile(words, value, "".join(old), moved, within(*mine, unit), good)
+            yield Tile(words, shown, "".join(old), moved, within(*mine, unit), good)
     yield from _peaks(best, base, content)
 
 
