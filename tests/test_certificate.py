@@ -11,7 +11,7 @@ import opened
 import pytest
 import tomli_w
 import xarray as xr
-from commands import kill_once_it_saved, overrides, run
+from commands import overrides, run
 from margins import at_least, fewest
 from scipy.interpolate import PchipInterpolator
 
@@ -625,26 +625,6 @@ def test_figure_and_page(certified):
     assert "Changes with effects disabled" in page
     assert "paired measurements with its 95 % confidence interval" in page
     assert "run time saved, estimated from evaluations" in caption(content, None)
-
-
-@pytest.mark.nightly
-@pytest.mark.mpi
-def test_ranks_and_a_kill_change_no_byte(certified, tmp_path):
-    place, _ = certified
-    expected = (place / "e.nc").read_bytes()
-    for ranks in (2, 3):
-        out = tmp_path / str(ranks) / "e.nc"
-        out.parent.mkdir()
-        code, output = run(words(out), ranks)
-        assert code == 0, output
-        assert out.read_bytes() == expected
-    out = tmp_path / "killed" / "e.nc"
-    out.parent.mkdir()
-    kill_once_it_saved([*words(out), "--checkpoint-interval", "0"], 2, out.parent)
-    assert not out.exists()
-    code, output = run(words(out), 2)
-    assert code == 0, output
-    assert out.read_bytes() == expected
 
 
 def test_a_linkage_is_certified(tmp_path):

@@ -1,17 +1,14 @@
 """The linkages of the gallery: every effect on each of them, pairwise; on-at-zero equals off; a run that was killed goes on."""
 
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import finish, kill, overrides, ranks_of, result_files, run, start
 from margins import energy_closes
 from pairwise import CONTACTS, FRICTIONS, pairwise_table
 
 from hpcclear import Scene, load_scene, simulate
 from hpcclear.base.outcome import Status
-from hpcclear.results.places import parts_of
 
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
@@ -100,28 +97,3 @@ def test_an_effect_at_zero_changes_nothing(name, zero):
     for quantity in ("body_x", "body_y", "body_angle"):
         a, b = on[quantity][early].to_numpy(), off[quantity][early].to_numpy()
         assert (np.abs(a - b) <= 1e-8 * np.abs(b).max()).all()
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n == "press" else pytest.mark.full) for n in NAMES]
-)
-@pytest.mark.nightly
-def test_samples_that_were_killed_go_on_to_the_same_bytes(name, tmp_path):
-    """Root, or the other rank, is killed after the first save."""
-    sets = overrides(*(f"{key}={value}" for key, value in SHORT.items()), "study.samples=40")
-    undisturbed = tmp_path / "undisturbed.nc"
-    code, output = run(["sample", str(LINKAGES / f"{name}.toml"), "-o", str(undisturbed), *sets], 2)
-    assert code == 0, output
-    for rank in (0, 1):
-        out = tmp_path / f"killed{rank}.nc"
-        words = ["sample", str(LINKAGES / f"{name}.toml"), "-o", str(out), *sets]
-        job = start([*words, "--checkpoint-interval", "0.05"], 2)
-        while job.poll() is None and not result_files(parts_of(out)):
-            time.sleep(0.02)
-        processes = ranks_of(job)
-        if rank in processes:
-            kill(processes[rank])
-        finish(job)
-        code, output = run(words, 2)
-        assert code == 0, output
-        assert out.read_bytes() == undisturbed.read_bytes()

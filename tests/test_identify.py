@@ -1,8 +1,6 @@
 """Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
 
-import os
 import re
-import signal
 import sys
 from functools import partial
 from pathlib import Path
@@ -11,7 +9,6 @@ import numpy as np
 import opened
 import pytest
 from click.testing import CliRunner
-from commands import finish, overrides, run, start, wait_for_parts
 from doc_pages import ROOT
 
 import hpcclear
@@ -526,28 +523,6 @@ def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
     other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
     assert other.exit_code == 2
     assert "another run" in " ".join(other.output.split())
-
-
-@pytest.mark.mpi
-@pytest.mark.full
-def test_ranks_and_a_kill_change_no_byte(measured, tmp_path):
-    """`pytest -m full tests/test_identify.py`."""
-    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "128"]  # fmt: skip
-    words += overrides(*SHORT)
-    files = []
-    for ranks in (0, 2):
-        out = tmp_path / str(ranks) / "identify.nc"
-        out.parent.mkdir()
-        if ranks:  # killed once the first half of the ensemble is kept
-            job = start([*words, "-o", str(out)], ranks)
-            wait_for_parts(job, out.parent)
-            os.killpg(job.pid, signal.SIGKILL)
-            finish(job)
-            assert not out.exists()
-        code, printed = run([*words, "-o", str(out)], ranks)
-        assert code in (0, 4), printed
-        files.append(out.read_bytes())
-    assert files[0] == files[1]
 
 
 def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, scene):

@@ -1,4 +1,4 @@
-"""Lives of worn joints: jumps against closed forms, what ends a life, statistics over lives, bytes over ranks and a kill."""
+"""Lives of worn joints: jumps against closed forms, what ends a life, statistics over lives; kills are in `test_kills`."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-from commands import kill_once_it_saved, overrides, run
+from commands import overrides, run
 from running import scene_with
 from scipy.integrate import solve_ivp
 from scipy.stats import binom
@@ -266,32 +266,12 @@ def test_a_linkage_wears_as_the_closed_form_says(tmp_path):
 
 
 @pytest.mark.nightly
-@pytest.mark.mpi
-def test_ranks_and_a_kill_change_no_byte(tmp_path):
-    files = []
-    for ranks in (0, 2, 3):
-        out = tmp_path / str(ranks) / "wear.nc"
-        out.parent.mkdir()
-        code, output = run(words(out), ranks)
-        assert code == 0, output
-        files.append(out.read_bytes())
-    assert files[0] == files[1] == files[2]
-    out = tmp_path / "killed" / "wear.nc"
-    out.parent.mkdir()
-    slow = [*words(out), "--checkpoint-interval", "0"]
-    kill_once_it_saved(slow, 2, out.parent)
-    assert not out.exists()
-    code, output = run(words(out), 2)
+def test_numbers_of_six_lives_hang_together(tmp_path):
+    code, output = run(words(tmp_path / "wear.nc"), 0)
     assert code == 0, output
-    assert out.read_bytes() == files[0]
-    found = opened.read(out, "wear")
-    check(found)
+    found = opened.read(tmp_path / "wear.nc", "wear")
     assert fan_figure(found) is not None
     assert survival_figure(found) is not None
-
-
-def check(found):
-    """Numbers of six lives hang together."""
     assert (found.ending == Status.OK).all()
     assert not (found.flags & Flag.TARGET_MISSED).any()
     followed = (found.ended >= found.cycle).transpose("life", "cycle")

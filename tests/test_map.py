@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from commands import kill_once_it_saved, run
 
 from hpcclear import grid
 from hpcclear.base.errors import InputError
@@ -126,25 +125,6 @@ def test_a_map_folds_back_into_a_grid(tmp_path):
     content.attrs = {}
     with pytest.raises(InputError):
         grid(content)
-
-
-@pytest.mark.mpi
-def test_ranks_and_a_kill_change_no_byte(tmp_path):
-    grids = ("C=0.3mm:1mm:8", "m3=0.1:0.2:4")
-    files = []
-    for ranks in (0, 3):  # two of them go on below
-        out = tmp_path / str(ranks) / "map.nc"
-        out.parent.mkdir()
-        code, output = run(words(out, *grids), ranks)
-        assert code == 0, output
-        files.append(out.read_bytes())
-    assert files[0] == files[1]
-    out = tmp_path / "killed" / "map.nc"
-    out.parent.mkdir()
-    kill_once_it_saved([*words(out, *grids), "--checkpoint-interval", "0.1"], 2, out.parent)
-    code, output = run(words(out, *grids), 2)
-    assert code == 0, output
-    assert out.read_bytes() == files[0]
 
 
 def test_a_plain_speed_on_an_axis_is_told_in_rpm_and_an_unknown_path_has_those_alike_first():
