@@ -240,14 +240,3 @@ def warm_command(*words: object, user: int | None = None) -> tuple[int, str]:
                 code = int(answer.recv(16))
         output.seek(0)
         return code, output.read().decode(errors="replace")
-
-
-def kill_once_it_saved(words: list[str], ranks: int, folder: Path) -> None:
-    """Start a command, and kill rank 1 when the first part of its work is in `folder`."""
-    job, deadline = start(words, ranks), time.time() + crowded(60.0)
-    while not result_files(folder):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.01)
-    kill(ranks_of(job)[1])
-    finish(job)

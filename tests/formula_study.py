@@ -4,19 +4,17 @@ A test states in which entries its study differs from `SMALL`. The fixture `carr
 """
 
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
+import formula
 from commands import MPIEXEC, warm
 from patience import crowded
 
 from hpcclear.scene import Scene, load_scene
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
-sys.path.insert(0, str(PROGRAMS))
 
-import formula  # noqa: E402
 
 SMALL = """
 seed = 3
@@ -52,12 +50,12 @@ def scene_of(study: str, *overrides: str) -> Scene:
     )
 
 
-def on_two_ranks(scene: Scene, place: Path, *words: object) -> Path:
-    """Results of a study by two ranks, in a place that is there."""
+def on_ranks(scene: Scene, place: Path, *words: object, ranks: int = 2) -> Path:
+    """Results of a study by so many ranks, in a place that is there."""
     (place / "scene.toml").write_text(scene.text)
     program = [str(PROGRAMS / "formula.py"), str(place / "scene.toml"), str(place / "out")]
     made = subprocess.run(
-        [str(MPIEXEC), "-n", "2", *warm().words([*program, *map(str, words)])],
+        [str(MPIEXEC), "-n", str(ranks), *warm().words([*program, *map(str, words)])],
         capture_output=True, text=True, timeout=crowded(300), check=False,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr

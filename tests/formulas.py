@@ -79,9 +79,6 @@ def formula(
     return f"({text} {sign} {other})", lambda given: _TWO[sign](value(given), second(given))
 
 
-_PIECES = (*"*/()9.,<%-d²~^", "**", "e9", " if ", " else ", "", "")
-
-
 def mutated(rng: random.Random, text: str) -> str:
     """A text with some characters dropped, doubled or replaced."""
     made = list(text)

@@ -2,17 +2,13 @@
 constraints on other responses, and the same bytes on any number of ranks."""
 
 import itertools
-import pathlib
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import opened
 import pytest
-from commands import warm
-from patience import crowded
+from formula_study import formula, on_ranks
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
@@ -24,12 +20,6 @@ from hpcclear.report.screens import screen_of
 from hpcclear.results.content import Results
 from hpcclear.scene import load_scene
 from hpcclear.study import run_study
-
-PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
-MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
 
 MIDDLES = {
     "m2": ("mechanism.rod.mass", 0.21),
@@ -227,24 +217,11 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
 
 @pytest.mark.nightly
 def test_the_same_bytes_on_two_ranks(results, tmp_path):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(all_kinds().text)
-    words = [
-        str(PROGRAMS / "formula.py"),
-        str(scene),
-        str(tmp_path / "out"),
-        "0",
-        "peak_crank_moment",
-    ]
-    done = subprocess.run(
-        [str(MPIEXEC), "-n", "2", *warm().words(words)],
-        capture_output=True, text=True, timeout=crowded(240), check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    made = on_ranks(all_kinds(), tmp_path, "0", "peak_crank_moment")
     names = [path.name for path in sorted(results.glob("*.nc")) if "timing" not in path.name]
     assert "worst.nc" in names
     for name in names:
-        assert (tmp_path / "out" / name).read_bytes() == (results / name).read_bytes(), name
+        assert (made / name).read_bytes() == (results / name).read_bytes(), name
 
 
 # -- load cases -------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import formula
 import numpy as np
 import pytest
 import report_data as data
@@ -26,9 +27,6 @@ from hpcclear.report.screen import Level
 from hpcclear.report.screens import screen_of
 from hpcclear.results import dataset
 from hpcclear.study import run_study
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-import formula
 
 NAMES = ("robust original", "robust alpha", "robust beta", "robust front 1", "calm alpha")
 

@@ -2,17 +2,12 @@
 
 import numpy as np
 import pytest
-import report_data as data
 from light import loaded_by
 
 import hpcclear
 import hpcclear.plugins
-from hpcclear import report
 from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluation.evaluator import COVERAGE, COVERAGE_ALONE, PERTURBATIONS
-from hpcclear.ensemble.api import as_points
 
 SCENE = "jobs/slider_crank.toml"
 SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
@@ -50,27 +45,6 @@ def test_evaluate_refuses_what_makes_no_mechanism():
         hpcclear.evaluate(scene, {"drive.spead": 1.0})
 
 
-def test_a_response_has_the_bits_of_the_sample_and_its_series_belong_to_it():
-    scene = hpcclear.load_scene(SCENE, SHORT)
-    response = hpcclear.simulate(scene)
-    sample = hpcclear.evaluate(scene, {"m1": 0.3})
-    assert response["status"] == 0
-    assert response["objective"] == sample["objective"][0]
-    assert abs(response["slider_position"][0] - 0.17) < 1e-15
-    assert response["time"][-1] == pytest.approx(0.012, rel=1e-14)
-    assert np.isfinite(response["energy_residual"]).all()
-
-
-def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_replicas_and_more():
-    scene = hpcclear.load_scene(SCENE, SHORT)
-    response = hpcclear.simulate(scene)
-    sample = evaluate_records(scene, as_points(scene, {"m1": 0.3}), perturbations=PERTURBATIONS)[0]
-    assert response.attrs["integrator"] == "tsitouras"
-    farthest = float(response["objective_uncertainty"]) / COVERAGE_ALONE
-    assert farthest >= float(sample["objective_uncertainty"]) / COVERAGE * (1.0 - 1e-12) > 0.0
-    assert farthest < 1e-3 * response["objective"]
-
-
 def test_commands_are_functions_that_return_datasets(tmp_path):
     scene = hpcclear.load_scene("jobs/hunt_crossley.toml", SHORT)
     cells = hpcclear.map(scene, "C=0.2mm:0.4mm:2", output=tmp_path / "map.nc", progress="quiet")
@@ -106,16 +80,3 @@ def test_notebooks_show_scenes_and_plans_as_tables():
     plan = Plan(rows, 100, None, 3.0, 4e8, 5, workers=4)
     assert "&lt;b&gt;" in plan._repr_html_()
     assert "100 simulations on 4 ranks" in plan._repr_html_()
-
-
-def test_figures_are_drawn_into_axes_of_the_caller():
-    from matplotlib.figure import Figure
-
-    response = data.response()
-    page = Figure()
-    axes = page.subplots(2, 1)
-    assert report.penetration_figure(response, ax=axes) is page
-    assert axes[0].lines
-    with pytest.raises(InputError, match="this figure has 2 panels"):
-        report.penetration_figure(response, ax=axes[0])
-    assert report.penetration_figure(response) is not page

@@ -2,10 +2,10 @@
 
 import json
 import math
-import sys
 import tomllib
 from pathlib import Path
 
+import formula
 import numpy as np
 import opened
 import pytest
@@ -52,10 +52,6 @@ from hpcclear.study import certificate as stage
 from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-
-import formula
 
 JOBS = Path(__file__).parent.parent / "jobs"
 SCENE = JOBS / "slider_crank.toml"

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from patience import crowded
 
-from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.errors import InputError
 from hpcclear.base.lock import Holder, Lock
 from hpcclear.base.outcome import (
     Status,
@@ -132,22 +132,6 @@ def test_a_kill_while_all_is_removed_leaves_nothing_to_go_on_from(tmp_path, monk
     assert again.load_stage("fit") is None
     discard(folder)
     assert not folder.exists()
-
-
-def test_a_full_disk_keeps_samples_in_memory_and_the_last_parts_on_disk(tmp_path, monkeypatch):
-    checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
-    add(checkpoint, outcomes(0, 3))
-
-    def full(*args: object) -> int:
-        raise OSError(errno.ENOSPC, "")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", full)
-        with pytest.raises(StorageError, match="No space left"):
-            add(checkpoint, outcomes(3, 3))
-    assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 3).tobytes()
-    checkpoint.flush()
-    assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 6).tobytes()
 
 
 def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp_path, monkeypatch):

@@ -12,7 +12,6 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from commands import MPIEXEC, warm
-from light import loaded_by
 from patience import crowded
 
 from hpcclear import __version__
@@ -35,13 +34,6 @@ def hpcclear(*words, timeout=300, module=False, ranks=0, cwd=ROOT, **more):
         check=False,
         **more,
     )
-
-
-def test_check_names_the_method_that_is_asked_for():
-    named = hpcclear("check", "jobs/slider_crank.toml", "--set", "numerics.method=prince-dormand")
-    assert "prince-dormand, rtol 1e-06" in named.stdout
-    own = hpcclear("check", "jobs/slider_crank.toml").stdout
-    assert "tsitouras, rtol" in own  # of responses and samples alike
 
 
 def test_check_says_what_would_be_simulated():
@@ -142,19 +134,6 @@ def test_a_former_name_of_a_command_is_one_and_is_not_listed(former, words):
     assert f"\n  {former} " not in CliRunner().invoke(cli, ["--help"]).output
 
 
-def test_words_of_a_former_name_go_to_the_command(tmp_path):
-    points = tmp_path / "points.csv"
-    points.write_text("name,x [mm],y [mm]\nO,0,0\nA,50,0\nB,150,80\nC,200,0\n")
-    made = [tmp_path / f"{name}.toml" for name in ("former", "new")]
-    said = [
-        CliRunner().invoke(cli, [*words, "--unit", "mm", str(points), str(file)])
-        for words, file in zip((["import"], ["init", "--import"]), made, strict=True)
-    ]
-    assert [one.exit_code for one in said] == [0, 0]
-    assert made[0].read_text() == made[1].read_text()
-    assert said[0].output.replace("former.toml", "new.toml") == said[1].output
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -163,6 +142,8 @@ def test_words_of_a_former_name_go_to_the_command(tmp_path):
         ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--bifurcation", "--y", "C=1:2:3"],
         ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--section", "1"],
         ["sample", "a.toml", "-o", "a.nc", "--merge", "--statistics"],
+        ["sample", "a.toml", "-o", "a.nc", "--statistics", "--points", "a.csv"],
+        ["sample", "a.toml", "-o", "a.nc", "--raw", "a"],
         ["reproduce", "a", "--crate", "--samples", "3"],
         ["init", "--import", "a.csv", "b.toml", "--jobs"],
         ["init", "a.csv", "b.toml"],
@@ -230,32 +211,6 @@ def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
     assert all(content == files[0] for content in files[1:])
 
 
-def test_repeating_a_finished_command_does_nothing_and_another_scene_is_refused(tmp_path):
-    out = tmp_path / "samples.nc"
-    words = [
-        "sample",
-        "jobs/quickstart.toml",
-        "-o",
-        out,
-        "--set",
-        "study.samples=40",
-        "--progress",
-        "quiet",
-    ]
-    assert hpcclear(*words).returncode == 0
-    before = (out.read_bytes(), os.stat(out).st_mtime_ns)
-    assert hpcclear(*words).returncode == 0
-    assert (out.read_bytes(), os.stat(out).st_mtime_ns) == before
-    other = hpcclear(*words, "--set", "drive.speed=500.0")
-    assert other.returncode == 2
-    assert "drive.speed" in other.stderr
-    assert out.read_bytes() == before[0]
-    fresh = hpcclear(*words, "--set", "drive.speed=500.0", "--fresh")
-    assert fresh.returncode == 0
-    assert out.read_bytes() == before[0]
-    assert len(list(tmp_path.glob("samples*.nc"))) == 4  # each with its times
-
-
 MONTE_CARLO = ["--set", "study.method=monte-carlo", "--set", "study.samples=64"]
 
 
@@ -274,26 +229,3 @@ def test_statistics_are_those_of_the_samples(tmp_path):
         float(samples["objective"].mean()), rel=1e-12
     )
     assert int(statistics["samples_by_status"].sum()) == 64
-
-
-def test_statistics_have_no_table_and_raw_goes_with_them(tmp_path):
-    words = ("sample", "jobs/quickstart.toml", "-o", tmp_path / "x.nc")
-    done = hpcclear(*words, "--statistics", "--points", "designs.csv")
-    assert done.returncode == 2
-    assert "--points" in done.stderr
-    done = hpcclear(*words, "--raw", tmp_path)
-    assert done.returncode == 2
-    assert "--raw" in done.stderr
-
-
-def test_a_command_that_simulates_loads_what_it_needs(tmp_path):
-    """Half a second of every command went to studies and statistics once, a quarter to xarray and pandas."""
-    studies = {"hpcclear.study", "scipy.stats", "scipy.optimize", "scipy.interpolate", "sklearn"}
-    studies.add("matplotlib")
-    assert not loaded_by("import hpcclear.cli.printing", studies)
-    words = ["simulate", str(ROOT / "jobs/slider_crank.toml"), "-o", str(tmp_path / "response.nc")]
-    code = f"import contextlib, hpcclear.cli\nwith contextlib.suppress(SystemExit): hpcclear.cli.main({words})"
-    figures = "hpcclear.report.figures.response"
-    heavy = studies | {"xarray", "pandas", "pint", "scipy.special", figures}
-    assert not heavy & loaded_by(code, heavy)
-    assert xr.load_dataset(tmp_path / "response.nc").sizes["joint"] == 2

@@ -15,6 +15,7 @@ import time
 import numpy as np
 import pytest
 from patience import crowded
+from synthetic import design, make_sleeping, records_of
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks import boundary, launcher
@@ -24,9 +25,7 @@ from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
 
-from synthetic import design, make_sleeping, records_of  # noqa: E402
 
 pytestmark = pytest.mark.mpi
 

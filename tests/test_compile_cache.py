@@ -6,17 +6,14 @@ import inspect
 import random
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
+from compile_cache import KINDS, damaged
 from patience import crowded
 
-from hpcclear.base import cached, code_folder, host, kept
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
-from compile_cache import KINDS, damaged
+from hpcclear.base import cached, host, kept
 
 
 @pytest.fixture
@@ -24,20 +21,6 @@ def said(monkeypatch, capsys):
     """What is said of damaged files."""
     monkeypatch.setattr(kept, "_said", [])
     return lambda: [line for line in capsys.readouterr().err.splitlines() if "damaged" in line]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_whatever_a_file_holds_it_is_whole_or_dropped(tmp_path, said, kind):
-    """60 damages of a content each: cut anywhere, emptied, one bit, random bytes."""
-    rng, path, content = random.Random(KINDS.index(kind)), tmp_path / "code", bytes(range(256)) * 9
-    for _ in range(60):
-        kept.write(path, content)
-        assert kept.read(path) == content
-        path.write_bytes(damaged(path.read_bytes(), kind, rng))
-        assert kept.read(path) is None
-        assert not path.exists()
-    assert len(said()) == 1  # one line a process, however many files
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.fixture
@@ -84,36 +67,6 @@ def test_a_damaged_file_of_any_sort_is_made_again_and_that_is_said(tmp_path, com
     assert len(said()) == 1
 
 
-def test_a_damaged_note_of_the_sources_changes_no_key(tmp_path, monkeypatch):
-    """It names the folder of compiled code: a key with one wrong letter would compile all again, in another folder."""
-    monkeypatch.setattr(code_folder, "_place", lambda: (tmp_path, False))
-    right, rng = code_folder.source_key.__wrapped__(), random.Random(1)
-    whole = (tmp_path / "sources").read_bytes()
-    assert code_folder.source_key.__wrapped__() == right
-    for k in range(20):
-        (tmp_path / "sources").write_bytes(damaged(whole, KINDS[k % 4], rng))
-        assert code_folder.source_key.__wrapped__() == right
-        assert (tmp_path / "sources").read_bytes() == whole
-
-
-def test_one_of_many_makes_a_file_and_the_others_wait(tmp_path):
-    """A lock is of an open file: threads exclude each other as processes do."""
-    path, made = tmp_path / "code", []
-
-    def make():
-        time.sleep(0.02)
-        made.append(path)
-        return b"code"
-
-    threads = [threading.Thread(target=kept.made, args=(path, make)) for _ in range(20)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(made) == 1
-    assert [one.name for one in tmp_path.iterdir()] == ["code"]
-
-
 HOLD = """
 import fcntl, sys, time
 file = open(sys.argv[1], "w")
@@ -131,17 +84,6 @@ def holder(tmp_path):
         assert process.stdout.readline() == "held\n"
         yield process
         process.kill()
-
-
-def test_the_lock_of_a_killed_process_is_free(tmp_path, holder, monkeypatch):
-    threading.Timer(0.2, holder.kill).start()
-    left = tmp_path / "code.abc.part"  # what it was writing
-    left.touch()
-    held = kept.lock(tmp_path / "code")
-    assert held is not None
-    kept.unlock(held)
-    assert holder.wait() != 0
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_nobody_waits_for_ever_and_only_once(tmp_path, holder, monkeypatch):

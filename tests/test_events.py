@@ -1,20 +1,15 @@
 """What happens inside a step: roots of the gaps' cubics, and peaks of force and penetration between its ends."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import ensemble, scene
 
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.stepping.events import absolute_integral, hermite, root
 from hpcclear.dynamics.stepping.explicit.tableau import PRINCE_DORMAND, TSITOURAS, Tableau
 from hpcclear.dynamics.stepping.lanes import Lanes
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
-
-from scenes import ensemble, scene
 
 
 def cubics(count: int):

@@ -3,8 +3,8 @@
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
+import formula
 import numpy as np
 import opened
 import pytest
@@ -20,10 +20,6 @@ from hpcclear.statistics.search.asking import SearchTask, minimise
 from hpcclear.statistics.search.pareto import Front, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import run_study
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-
-import formula
 
 UNIT = np.array([[0.0, 1.0]] * 6)
 

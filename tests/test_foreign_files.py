@@ -24,8 +24,6 @@ from hpcclear.cli.terminal import print_remark
 from hpcclear.results import dataset, netcdf
 from hpcclear.results.content import Results
 from hpcclear.results.crate import NAME
-from hpcclear.scene import load_scene
-from hpcclear.scene.loading import scene_of_text
 
 ROOT = Path(__file__).parent.parent
 QUICKSTART = ROOT / "jobs" / "quickstart.toml"
@@ -80,16 +78,6 @@ def test_no_file_that_the_scene_of_a_result_names_is_opened(tmp_path, secret, mo
     assert all(words[1] == "not simulated" for words in said)
     assert "names a file" in said[0][2]
     assert "names a file" in said[1][2]
-
-
-def test_a_result_carries_the_values_of_measured_files(tmp_path):
-    (tmp_path / "measured.csv").write_text("C [mm]\n0.44\n0.31\n0.36\n")
-    (tmp_path / "scene.toml").write_text(naming(Path("measured.csv")))
-    scene = load_scene(tmp_path / "scene.toml", ["study.samples=40"])
-    (tmp_path / "measured.csv").unlink()
-    again = scene_of_text(scene.text, "samples.nc")
-    assert again.hash == scene.hash
-    assert again.required_study.samples == 40
 
 
 @pytest.mark.parametrize("command", ["crate", "reproduce"])
@@ -271,22 +259,6 @@ def test_what_somebody_made_before_is_not_used_and_that_is_said_once(
     assert set(Path(tempfile.gettempdir()).iterdir()) == before
 
 
-def test_a_named_cache_needs_no_directory_for_temporary_files(tmp_path, monkeypatch, said, home):
-    """With /tmp and /var/tmp full or read-only."""
-
-    def nowhere() -> str:
-        raise FileNotFoundError("No usable temporary directory found")
-
-    monkeypatch.setattr(tempfile, "gettempdir", nowhere)
-    monkeypatch.setenv("HPCCLEAR_CACHE", str(tmp_path))
-    assert private_folder("HPCCLEAR_CACHE").parent == tmp_path
-    monkeypatch.delenv("HPCCLEAR_CACHE")
-    assert private_folder("HPCCLEAR_CACHE") == home
-    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
-    with pytest.raises(InputError, match="HPCCLEAR_CACHE"):
-        private_folder("HPCCLEAR_CACHE")
-
-
 def test_where_nothing_can_be_kept_a_temporary_folder_goes_at_the_end(tmp_path):
     code = "from hpcclear.base.private import private_folder; print(private_folder('HPCCLEAR_CACHE').is_dir())"
     known = {
@@ -301,24 +273,3 @@ def test_where_nothing_can_be_kept_a_temporary_folder_goes_at_the_end(tmp_path):
     assert done.stdout == "True\n"
     assert "compiles anew" in done.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"NUMBA_CACHE_DIR": "/proc/nowhere"},
-        {"HPCCLEAR_CACHE": "/proc/nowhere"},
-        {"TMPDIR": "/proc/nowhere"},
-    ],
-    ids=lambda settings: next(iter(settings)),
-)
-def test_a_place_that_cannot_be_written_to_ends_no_command(tmp_path, settings):
-    code = "from hpcclear.base.code_folder import chosen_folder; print(chosen_folder())"
-    known = {"HPCCLEAR_CACHE": str(tmp_path / "own"), "XDG_CACHE_HOME": str(tmp_path / "home")}
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=crowded(60.0),
-        env=os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": ""} | known | settings,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert Path(done.stdout.strip()).is_relative_to(tmp_path)
-    assert done.stderr.count("Warning:") == (0 if "TMPDIR" in settings else 1), done.stderr

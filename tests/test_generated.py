@@ -1,8 +1,5 @@
 """Generated motions: against a dense model that shares no formula."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from dense_linkage import Dense, stiffness
@@ -13,8 +10,6 @@ from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 
 FAST = constant_speed("motor", "crank", 200.0)
 IN_PLACE = ("slider-crank, two", "v-twin, ideal, torque", "quick-return")

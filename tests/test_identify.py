@@ -1,7 +1,6 @@
 """Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
 
 import re
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -33,8 +32,6 @@ from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
 from hpcclear.results.content import Results
 from hpcclear.results.signals import signals_in
-
-sys.path.insert(0, str(ROOT / "analysis"))
 
 SCENE = ROOT / "jobs" / "identify.toml"
 UNKNOWN = "joints.crank_rod.clearance=10um:150um"

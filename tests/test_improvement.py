@@ -4,7 +4,7 @@ import moocore
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_two_ranks, scene_of
+from formula_study import contents, formula, on_ranks, scene_of
 
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene.domain import box
@@ -205,4 +205,4 @@ def test_a_search_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monke
 @pytest.mark.mpi
 def test_a_search_has_the_same_bytes_on_two_ranks(done, tmp_path):
     """``python -m pytest tests/test_improvement.py -m full``"""
-    assert contents(on_two_ranks(study(), tmp_path)) == contents(done)
+    assert contents(on_ranks(study(), tmp_path)) == contents(done)

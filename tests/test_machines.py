@@ -1,16 +1,10 @@
 """Machines with plain bearings: numbers by hand, within the range of line contact when new, and their page."""
 
-import sys
-from pathlib import Path
-
+import machines
 import pytest
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Flag, Status
-
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "analysis"))
-import machines  # noqa: E402
 
 
 @pytest.mark.parametrize(

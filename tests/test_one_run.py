@@ -9,11 +9,13 @@ import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import formula
 import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner
 from patience import crowded
+from streaming_run import make_made_up
 
 from hpcclear.accuracy.profile import PROFILES
 from hpcclear.accuracy.run import run_accuracy
@@ -35,10 +37,7 @@ from hpcclear.study import run_study
 
 ROOT = Path(__file__).parent.parent
 JOBS = ROOT / "jobs"
-sys.path.insert(0, str(ROOT / "tests" / "mpi_programs"))
 
-import formula  # noqa: E402
-from streaming_run import make_made_up  # noqa: E402
 
 QUIET = Options(style="quiet")
 FRESH = Options(fresh=True, style="quiet")
@@ -324,25 +323,6 @@ def test_no_file_of_another_run_goes_into_a_study(tmp_path, studied, command):
     with pytest.raises(InputError, match="an unfinished run"):
         command(tmp_path)
     assert before == {path: path.read_bytes() for path in studied.rglob("*") if path.is_file()}
-
-
-def test_a_study_does_not_begin_where_another_run_is_or_was(tmp_path):
-    place = tmp_path / "place"
-    place.mkdir()
-    with locked(place, ".mine.nc.lock"), pytest.raises(InputError, match="holds it"):
-        run(place)
-    planted(place / "mine.nc")
-    with pytest.raises(InputError, match="another run"):
-        run(place)
-    assert set(contents(place)) == {"mine.nc"}
-
-
-def test_a_response_replaces_no_result_of_a_study(studied):
-    before = (studied / "samples.nc").read_bytes()
-    words = ["simulate", str(JOBS / "slider_crank.toml"), "-o", str(studied / "samples.nc")]
-    done = CliRunner().invoke(cli, words)
-    assert isinstance(done.exception, InputError)
-    assert (studied / "samples.nc").read_bytes() == before
 
 
 # -- names of results -------------------------------------------------------------------------------

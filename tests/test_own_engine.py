@@ -1,11 +1,11 @@
 """What results say of an engine of one's own: its own numbers, its own names, the objective that was asked for."""
 
 import re
-import sys
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
+import formula
 import numpy as np
 import opened
 import pytest
@@ -23,9 +23,6 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.describing import implausible
 from hpcclear.study import responses, run_study
 from hpcclear.study.optimisation import Choice
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-import formula
 
 JOBS = Path(__file__).parent.parent / "jobs"
 PLAYS = ("joints.crank_rod.clearance", "joints.rod_slider.clearance")

@@ -1,8 +1,6 @@
 """An installed package with a plug-in of each kind: listed, and each used in a small run."""
 
-import sys
-from pathlib import Path
-
+import formula
 import numpy as np
 import opened
 import pytest
@@ -16,10 +14,6 @@ from hpcclear.cli import cli
 from hpcclear.plugins import KINDS
 from hpcclear.ranks.boundary import alone
 from hpcclear.study import run_study
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-
-import formula
 
 SOURCE = '''
 """Plug-ins of a package: one of each kind."""

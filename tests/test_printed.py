@@ -1,28 +1,15 @@
 """What is printed and drawn is what it is called: launchers, early stops, indices, peaks, contact, fronts, fits."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import report_data as data
 import xarray as xr
-from click.testing import CliRunner
 from commands import finish, start
-from test_figures import _other_goals
 
 from hpcclear import report
-from hpcclear.base.objectives import Usual
-from hpcclear.cli import cli
 from hpcclear.cli.printing import describe_response
-from hpcclear.ranks.stopping import Stopped
 from hpcclear.report.answer import answer
-from hpcclear.report.figures import labels, motion
-from hpcclear.report.html import picture
-from hpcclear.report.html.content import Content
-
-ROOT = Path(__file__).parent.parent
-SLIDER_CRANK = ROOT / "jobs" / "slider_crank.toml"
-
+from hpcclear.report.figures import motion
 
 # -- launchers, and early stops -----------------------------------------------------------------------
 
@@ -44,31 +31,7 @@ def test_check_counts_the_ranks_that_reached_each_other():
     assert "2 ranks connected" in " ".join(output.split())
 
 
-@pytest.mark.parametrize(
-    ("words", "where", "resumes"),
-    [
-        (["accuracy", "--plan", "jobs/quickstart.toml"], "hpcclear.accuracy.plan.measure", False),
-        (["run", "jobs/quickstart.toml", "-o", "x"], "hpcclear.study.run_study", True),
-    ],
-)
-def test_a_command_that_keeps_nothing_says_so_when_it_is_stopped(
-    words, where, resumes, monkeypatch
-):
-    def stop(*arguments, **named):
-        raise Stopped("SIGTERM was received")
-
-    monkeypatch.setattr(where, stop)
-    monkeypatch.chdir(ROOT)
-    done = CliRunner().invoke(cli, words, standalone_mode=False)
-    assert ("goes on from here" in done.output) == resumes
-    assert ("starts anew" in done.output) != resumes
-
-
 # -- sensitivity, and surrogates that do not fit ------------------------------------------------------
-
-
-def content(files: dict[str, xr.Dataset]) -> Content:
-    return Content(Path("out"), files, {})
 
 
 def indices(first, total, error=0.01):
@@ -116,42 +79,6 @@ def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
 
 
 # -- the front on the page -----------------------------------------------------------------------------
-
-
-USUAL = {"mean of f": Usual.MEAN, "standard deviation of f": Usual.DEVIATION}
-
-
-def with_goals(verified: xr.Dataset, words: dict[str, tuple[str, ...]]) -> xr.Dataset:
-    """The same with what each case makes small, as the study writes it."""
-    cases = [str(case) for case in verified["case"].to_numpy()]
-    for k, name in enumerate(("first", "second")):
-        verified[f"{name}_goal"] = ("design", np.array([words[case][k] for case in cases]))
-        units = ["m" if words[case][k].endswith(" of f") else "" for case in cases]
-        verified[f"{name}_unit"] = ("design", np.array(units))
-        usual = [USUAL.get(words[case][k], Usual.OTHER) for case in cases]
-        verified[f"{name}_usual"] = ("design", np.array(usual, np.int8))
-    return verified
-
-
-def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
-    """One case, a quantile against a formula: no mean, no deviation at first."""
-    front, verified = _other_goals()
-    case = str(front["case"][0].item())
-    front = front.isel(case=[0])
-    own = verified.isel(design=np.flatnonzero(verified["case"].to_numpy() == case))
-    goals = ("95th percentile of f", "m2 + m3")
-    shown = picture.front(content({"front": front, "verification": with_goals(own, {case: goals})}))
-    assert (shown["x"], shown["y"]) == ("95th percentile of f (mm)", "m2 + m3")
-    assert [label.partition(" (")[0] for label in shown["axes"][2:]] == [
-        "mean of f",
-        "standard deviation of f",
-    ]
-    seconds = [p["y"] for p in shown["points"] if p["y"] is not None]
-    assert sorted(seconds) == pytest.approx(np.sort(own["second_true"].to_numpy()), rel=1e-5)
-    beta = next(p for p in shown["points"] if p["name"] == f"{case} beta")
-    one = own.sel(design=f"{case} beta")
-    assert beta["x"] == pytest.approx(1e3 * float(one["first_true"]), rel=1e-5)
-    assert ["m2 + m3", labels.quantity(float(one["second_true"]), "")] in beta["direct"]
 
 
 # -- one response --------------------------------------------------------------------------------------

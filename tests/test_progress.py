@@ -49,21 +49,6 @@ def test_a_log_gets_a_line_every_interval_with_percentage_failures_and_eta():
     ]
 
 
-def test_a_log_repeats_no_line_but_a_sign_of_life():
-    clock, log = Clock(), io.StringIO()
-    progress = Progress("sampling", "log", 5.0, log, clock)
-    progress.start(200, records(0))
-    progress.add(records(10))
-    for _ in range(61):  # nothing is finished for five minutes
-        clock.now += 5.0
-        progress.refresh()
-    assert len(log.getvalue().splitlines()) == 2
-    progress.add(records(1))
-    clock.now += 5.0
-    progress.refresh()
-    assert log.getvalue().splitlines()[2].startswith("sampling: 11/200")
-
-
 def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
     clock, log = Clock(), io.StringIO()
     progress = Progress("", "log", 5.0, log, clock)

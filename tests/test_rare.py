@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_two_ranks, scene_of
+from formula_study import contents, formula, on_ranks, scene_of
 from margins import at_least, at_most, fewest
 from scipy import stats
 
@@ -304,5 +304,5 @@ def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch
         formula.replace_dynamics(monkeypatch.setattr)
         assert formula.run_in_pieces(scene, str(tmp_path / "out"), alone()) > 3
     else:
-        on_two_ranks(scene, tmp_path)
+        on_ranks(scene, tmp_path)
     assert contents(tmp_path / "out") == whole

@@ -16,15 +16,12 @@ import opened
 import pytest
 import report_data as data
 from browser import Browser
-from light import loaded_by
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.session import command_line
-from hpcclear.report.html import markup, picture
+from hpcclear.report.html import picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
-from hpcclear.report.screen import Screen
-from hpcclear.report.sheet import SheetContent
 
 
 class Tree(HTMLParser):
@@ -200,26 +197,6 @@ def test_the_crank_is_found_from_the_motion() -> None:
     response["eccentricity_y"][:, 0] = crank[:, 1] - bearing[:, 1]
     points = np.array(picture.frames(response, response)["points"])
     np.testing.assert_allclose(np.hypot(points[:, 2], points[:, 3]), 0.05, rtol=1e-5)  # six digits
-
-
-def test_data_for_the_script_cannot_end_its_element() -> None:
-    hostile = {"z": "</script><script>alert(1)</script>&", "a": ""}
-    texts = dict.fromkeys(("title", "policy", "style", "script", "source"), "")
-    lists = dict.fromkeys(("beside", "subjects", "anchors", "further"), ())
-    flags = dict.fromkeys(("spans", "motions", "points"), False)
-    first = Screen("nothing")
-    sheet = SheetContent(first, (), (), ())
-    made = markup.render(
-        "page.html", **texts, **lists, **flags, screen=first, picture=hostile, sheet=sheet
-    )
-    tree = Tree(made)
-    assert [t for t, _ in tree.elements].count("script") == 2
-    assert list(json.loads(tree.content["content"]).items()) == list(hostile.items())
-
-
-def test_drawing_needs_neither_kernel_nor_mpi() -> None:
-    heavy = {"numba", "mpi4py", "sklearn", "matplotlib", "scipy"}
-    assert not loaded_by("import hpcclear.report.html.page", heavy)
 
 
 # -----------------------------------------------------------------------------------------------

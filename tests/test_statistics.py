@@ -1,15 +1,13 @@
 """Streamed statistics: against plain numpy, in any order of arrival, over stops and numbers of ranks."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import opened
 import pytest
 import xarray as xr
-from patience import crowded
+from commands import finish, start
+from streaming_run import make_made_up, scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
@@ -22,9 +20,7 @@ from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.streams import Accumulator, Summary, columns, rows_of
 
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
-sys.path.insert(0, str(PROGRAM.parent))
 
-from streaming_run import make_made_up, scene_of  # noqa: E402
 
 QUIET = Options(style="quiet")
 
@@ -181,81 +177,34 @@ def test_latin_hypercubes_are_refused(tmp_path):
         run_statistics(hypercube, tmp_path / "out.nc", alone())
 
 
-def launch(ranks: int, *arguments: object, **settings: str) -> subprocess.CompletedProcess:
-    """The streaming program on so many ranks."""
-    mpiexec = Path(sys.executable).parent / "mpiexec"
-    command = [str(mpiexec), "-n", str(ranks)] if ranks else []
-    return subprocess.run(
-        [*command, sys.executable, str(PROGRAM), *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=crowded(120),
-        env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[2])} | settings,
-        check=False,
-    )
+def launch(ranks: int, *arguments: object, **settings: str) -> tuple[int, str]:
+    """Exit code and output of the streaming program on so many ranks."""
+    return finish(start([*map(str, arguments)], ranks, (str(PROGRAM),), **settings), 120.0)
 
 
 @pytest.mark.mpi
 def test_bytes_do_not_depend_on_ranks_or_stops(tmp_path):
     files = [tmp_path / name for name in ("one.nc", "three.nc", "stopped.nc")]
-    assert launch(0, files[0], 60000).returncode == 0
-    assert launch(3, files[1], 60000).returncode == 0
-    assert launch(2, files[2], 60000, 0.3).returncode == 3
+    assert launch(0, files[0], 60000)[0] == 0
+    assert launch(3, files[1], 60000)[0] == 0
+    assert launch(2, files[2], 60000, 0.3)[0] == 3
     assert not files[2].exists()
-    assert launch(0, files[2], 60000).returncode == 0
+    assert launch(0, files[2], 60000)[0] == 0
     assert files[0].read_bytes() == files[1].read_bytes() == files[2].read_bytes()
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".lock"}
     assert left == {path.name for one in files for path in (one, one.with_suffix(".timing.nc"))}
 
 
-def written(folder: Path) -> dict[str, bytes]:
-    """Statistics and samples in a folder, by name."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*.nc")
-        if not path.name.endswith("timing.nc")
-    }
-
-
-@pytest.mark.mpi
-@pytest.mark.full
-@pytest.mark.parametrize("keeps", [False, True])
-def test_samples_kept_or_not_change_no_bit_over_stops_and_ranks(tmp_path, keeps):
-    here, there, stopped = (tmp_path / name for name in ("here", "there", "stopped"))
-    for place in (here, there, stopped):
-        place.mkdir()
-
-    def run(place: Path, ranks: int, *limit: float) -> int:
-        settings = {"RAW": str(place / "raw")} if keeps else {}
-        return launch(ranks, place / "out.nc", 120_000, *limit, **settings).returncode
-
-    assert run(here, 0) == 0
-    assert run(there, 4) == 0
-    assert run(stopped, 4, 0.5) == 3
-    assert run(stopped, 2, 0.5) == 3
-    assert run(stopped, 3) == 0
-    assert written(there) == written(stopped) == written(here)
-    assert len(written(here)) == (1 + 30 if keeps else 1)
-
-
 @pytest.mark.mpi
 def test_an_error_of_a_rank_is_told_once_and_loses_nothing(tmp_path):
     place = tmp_path / "out.nc"
-    failed = launch(4, place, 60_000, FAILS="1")
-    assert failed.returncode == 1
-    assert failed.stderr.count("Traceback") == 1
-    assert "on rank 1 of 4" in failed.stderr
-    assert launch(0, place, 60_000).returncode == 0
-    assert launch(0, tmp_path / "whole.nc", 60_000).returncode == 0
+    code, told = launch(4, place, 60_000, FAILS="1")
+    assert code == 1
+    assert told.count("Traceback") == 1
+    assert "on rank 1 of 4" in told
+    assert launch(0, place, 60_000)[0] == 0
+    assert launch(0, tmp_path / "whole.nc", 60_000)[0] == 0
     assert place.read_bytes() == (tmp_path / "whole.nc").read_bytes()
-
-
-def test_samples_of_another_run_are_not_written_over(tmp_path):
-    raw = tmp_path / "raw"
-    run_statistics(scene_of(100), tmp_path / "earlier.nc", alone(), raw=raw, options=QUIET)
-    with pytest.raises(InputError, match="another run"):
-        run_statistics(scene_of(9000), tmp_path / "out.nc", alone(), raw=raw, options=QUIET)
 
 
 def test_samples_that_were_not_kept_are_not_promised(tmp_path):
@@ -274,18 +223,18 @@ def test_samples_that_were_not_kept_are_not_promised(tmp_path):
 @pytest.mark.mpi
 def test_samples_summed_up_without_files_are_made_again(tmp_path):
     output, raw = tmp_path / "out.nc", tmp_path / "raw"
-    assert launch(2, output, 60_000, FAILS="1").returncode == 1
-    done = launch(2, output, 60_000, RAW=str(raw))
-    assert done.returncode == 0, done.stderr
-    assert "simulated again" in done.stderr + done.stdout
+    assert launch(2, output, 60_000, FAILS="1")[0] == 1
+    code, told = launch(2, output, 60_000, RAW=str(raw))
+    assert code == 0, told
+    assert "simulated again" in told
     assert sum(xr.load_dataset(one).sizes["sample"] for one in raw.glob("samples-*.nc")) == 60_000
 
 
 def peak(output: Path, samples: int) -> float:
     """Greatest memory of root in MB."""
-    job = launch(0, output, samples)
-    assert job.returncode == 0, job.stderr
-    return float(job.stdout.split()[-1])
+    code, told = launch(0, output, samples)
+    assert code == 0, told
+    return float(told.split()[-1])
 
 
 def test_memory_does_not_grow_with_the_samples(tmp_path):

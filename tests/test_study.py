@@ -1,19 +1,14 @@
 """The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
 
 import json
-import pathlib
 import re
-import subprocess
-import sys
 import tomllib
 from collections import Counter
 
 import numpy as np
 import opened
 import pytest
-from commands import warm
-from formula_study import PROGRAMS, contents, formula
-from patience import crowded
+from formula_study import contents, formula, on_ranks
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
@@ -35,15 +30,12 @@ from hpcclear.study import (
     extent,
     responses,
     run_study,
-    sensitivities,
 )
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.paper.recognition import is_the_papers, own_names
 from hpcclear.study.problem import problem_of
 from hpcclear.study.stages import files_of
-
-MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
@@ -357,17 +349,6 @@ def _interrupt(checkpoint: Checkpoint) -> None:
     raise KeyboardInterrupt
 
 
-def test_a_run_stopped_amid_fits_has_its_samples_on_disk(tmp_path, monkeypatch):
-    def stopped(*_):
-        raise Stopped("test")
-
-    monkeypatch.setattr(sensitivities, "_first_order", stopped)
-    with pytest.raises(Stopped):
-        run_study(scene_of(), tmp_path / "out", alone(), progress_style="quiet")
-    parts = [opened.read(path) for path in (tmp_path / "out" / "checkpoint").glob("part-*.nc")]
-    assert sum(part.sizes["sample"] for part in parts) > 100
-
-
 def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
     place, ranks, calls = tmp_path / "stopped", alone(), [0]
     work = formula.FormulaWorker.advance
@@ -401,18 +382,7 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
 @pytest.mark.parametrize("ranks", [2, 3])
 @pytest.mark.shortened(1)
 def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(scene_of().text)
-    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
-    done = subprocess.run(
-        [str(MPIEXEC), "-n", str(ranks), *program],
-        capture_output=True,
-        text=True,
-        timeout=crowded(120),
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert contents(tmp_path / "out") == contents(results)
+    assert contents(on_ranks(scene_of(), tmp_path, ranks=ranks)) == contents(results)
 
 
 # -- failures, infill, refusals ---------------------------------------------------------------------
@@ -474,26 +444,6 @@ def test_a_surrogate_that_never_holds_is_reported(tmp_path):
     assert "Use the simulated values." in told[-1]
     found = opened.read(tmp_path / "out" / "verification.nc")
     assert told[-1] in found.attrs["remarks"]
-
-
-def test_results_of_another_study_are_refused(results):
-    scene = scene_of("study.seed=4")
-    with pytest.raises(InputError, match=r"study\.seed"):
-        run_study(scene, results, alone(), progress_style="quiet")
-
-
-def test_fresh_starts_beside(results, tmp_path, monkeypatch):
-    place = tmp_path / "taken"
-    place.mkdir()
-    (place / "note").touch()
-    told: list[str] = []
-    monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)  # ends at once
-    with pytest.raises(InputError, match="failed"):
-        run_study(
-            scene_of(), place, alone(), fresh=True, progress_style="quiet", notify=told.append
-        )
-    assert (tmp_path / "taken-2").is_dir()
-    assert str(tmp_path / "taken-2") in told[0]
 
 
 @pytest.mark.parametrize(

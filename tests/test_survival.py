@@ -16,9 +16,6 @@ import pytest
 from kills import COMMANDS, OPTIONS, Undisturbed, files
 from patience import crowded
 
-sys.path.insert(0, str(commands.PROGRAM.parent))
-
-
 pytestmark = [pytest.mark.mpi, pytest.mark.nightly]
 
 

@@ -1,18 +1,15 @@
 """Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
 
 import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
+import formula
 import numpy as np
 import opened
 import pytest
 import xarray as xr
 from browser import Browser, needed
-from commands import MPIEXEC, warm
-from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
@@ -27,11 +24,6 @@ from hpcclear.results.content import Results, each
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import run_study
-
-PROGRAMS = Path(__file__).parent / "mpi_programs"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
 
 UNIT = 1e-4  # m, of mean and deviation on the sphere
 MEAN, DEVIATION = 2.0, 1.0  # where its centre lies
@@ -80,14 +72,8 @@ def _dynamics(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("three") / "whole"
-    patch = pytest.MonkeyPatch()
-    formula.replace_dynamics(patch.setattr)
-    patch.setattr(formula, "objective", sphere)
-    run_study(scene_of(), place, alone(), progress_style="quiet")
-    patch.undo()
-    return place
+def study(carried_out) -> Path:
+    return carried_out(scene_of(), objective=sphere)
 
 
 def verified(place: Path) -> xr.Dataset:
@@ -170,29 +156,6 @@ def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path
     assert formula.run_in_pieces(scene_of(), str(place), alone()) >= 6
     for name in ("front.nc", "verification.nc", "chaos.nc"):
         assert (place / name).read_bytes() == (study / name).read_bytes(), name
-
-
-@pytest.mark.mpi
-@pytest.mark.nightly  # with two objectives in test_goals
-def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
-    """By the formula of other studies, whose program ranks can start."""
-    light = 'study.cases={light={random=["C", "m2"], objectives=["mean", "deviation", {formula="m2 + m3"}]}}'
-    scene = tmp_path / "scene.toml"
-    scene.write_text(scene_of(light, "study.swarm.algorithm=pymoo:NSGA3").to_toml())
-    for ranks in (1, 2):
-        program = warm().words(
-            [str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / str(ranks))]
-        )
-        launch = [str(MPIEXEC), "-n", str(ranks), *program]
-        done = subprocess.run(
-            launch, capture_output=True, text=True, timeout=crowded(120), check=False
-        )
-        assert done.returncode == 0, done.stderr
-    for name in ("front.nc", "verification.nc", "samples.nc"):
-        one, two = ((tmp_path / ranks / name).read_bytes() for ranks in ("1", "2"))
-        assert one == two, name
-    found = opened.read(tmp_path / "1" / "verification.nc")
-    assert float(found["third_true"].sel(design="light gamma")) == pytest.approx(0.175, abs=2e-3)
 
 
 # -- cases beside each other ------------------------------------------------------------------------

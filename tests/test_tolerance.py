@@ -8,7 +8,7 @@ import formula_study
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_two_ranks
+from formula_study import contents, formula, on_ranks
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.samples import sample_points
@@ -200,7 +200,7 @@ def test_a_study_that_is_stopped_after_each_stage_ends_with_the_same_bytes(done,
 
 @pytest.mark.mpi
 def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
-    assert contents(on_two_ranks(scene_of(), tmp_path, BIAS)) == contents(done[0])
+    assert contents(on_ranks(scene_of(), tmp_path, BIAS)) == contents(done[0])
 
 
 def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeypatch):

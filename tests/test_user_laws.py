@@ -3,7 +3,6 @@ lanes, on ranks, and refused where they are at fault."""
 
 import math
 import shutil
-import sys
 from pathlib import Path
 
 import commands
@@ -21,7 +20,6 @@ from hpcclear.scene.laws import ENTRIES
 from hpcclear.scene.paths import quantities
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "analysis"))
 
 
 LAWS = Path(__file__).parent / "data" / "mylaws.py"

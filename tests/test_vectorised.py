@@ -1,21 +1,14 @@
 """The lanes are vectors in the machine code, and the counter that says so can tell."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-
-ANALYSIS = Path(__file__).parents[1] / "analysis"
-sys.path.insert(0, str(ANALYSIS))
-
-from assembly import (  # noqa: E402
+from assembly import (
     Arithmetic,
     executed_arithmetic,
     force_evaluation,
 )
-from scenes import LAWS, scene, single  # noqa: E402
+from scenes import LAWS, scene, single
+
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 
 
 def arithmetic(law: str, width: int) -> Arithmetic:

@@ -3,7 +3,6 @@
 import cmath
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import commands
 import numpy as np
@@ -32,7 +31,6 @@ from hpcclear.dynamics.wear.relief import Relief, kernel
 from hpcclear.report import profile_figure
 from hpcclear.scene import load_scene
 
-SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
 WAVES = {
     "crank_rod": {
         "bearing": {"cosine_1": 2e-5, "sine_1": -1e-5, "cosine_2": "30 um", "sine_3": 1e-5},

@@ -1,4 +1,4 @@
-"""Clearances of a study that are random as wear leaves them: their distribution, refusals, the study; kills are in `test_kills`."""
+"""Clearances of a study that are random as wear leaves them: their distribution, refusals, the study (kills: `test_kills`)."""
 
 from pathlib import Path
 
