@@ -102,6 +102,14 @@ def run(words: Sequence[str], ranks: int = 2, **settings: str) -> tuple[int, str
     return finish(start(words, ranks, begin_warm=plain and not loads, **settings))
 
 
+def limited(kind: int, amount: int, words: Sequence[str], ranks: int = 0) -> tuple[int, str]:
+    """Exit code and output of a command under a resource limit (what ulimit sets)."""
+    limit = f"import os, resource, sys; resource.setrlimit({kind}, ({amount}, {amount}))\n"
+    limit += "os.execvp(sys.argv[1], sys.argv[1:])"
+    program = ("-c", limit, sys.executable, "-m", "hpcclear")
+    return finish(start(words, ranks, program))
+
+
 def kill(process: int, number: int = signal.SIGKILL) -> None:
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, number)

@@ -75,7 +75,7 @@ def pytest_generate_tests(metafunc):
 
 
 LONGEST = (
-    "survival", "docs", "release", "native_windows", "random_scenes", "linkage_scenes", "limits", "accuracy", "certificate",
+    "survival", "docs", "native_windows", "random_scenes", "linkage_scenes", "limits", "accuracy", "certificate",
     "effects", "cli", "statistics", "fuzz", "bending", "cluster", "goals", "reference", "guides", "hostile", "tight",
     "further_responses", "stiff", "jacobian", "hard_cases", "ideal", "motion", "run", "comm", "study",
 )  # fmt: skip

@@ -68,6 +68,8 @@ artefacts() {
     du -k "$place"/*.whl "$place"/*.tar.gz | sed 's/\t/ KiB  /'
     [ "$(du -k "$place"/*.whl | cut -f1)" -lt 3000 ] || { echo "the wheel is larger than 3 MB" && return 1; }
     grep -q '^hpcclear/cli/jobs/quickstart.toml$' "$place/wheel-files.txt"
+    [ -z "$(find hpcclear -name '*.py' | sort | comm -23 - "$place/wheel-files.txt")" ] || { echo "the wheel lacks modules" && return 1; }
+    ! unzip -p "$place"/*.whl '*/METADATA' | grep -E '\]\((\.|docs|analysis|jobs)' || { echo "links of the index are not absolute" && return 1; }
     twine check --strict "$place"/*.whl "$place"/*.tar.gz
     check-wheel-contents --ignore W002 "$place"/*.whl # equal files: the shared texts of empty __init__
     validate-pyproject pyproject.toml
@@ -112,6 +114,7 @@ installed() {
     hpcclear init jobs --jobs
     hpcclear check engine.toml --no-cost
     hpcclear simulate jobs/slider_crank.toml -o results/response.nc
+    mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc --set study.samples=32
     hpcclear report results
     hpcclear plot results/response.nc --figure orbit -o orbit.png
     hpcclear show citation >hpcclear.bib

@@ -2,7 +2,7 @@
 # Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if a test failed.
 #   bash tests/run.sh           short profile: what a change must pass before it lands (.ci/run)
 #   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
-#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, examples, release, kills, fuzz, more parameters
+#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, examples, kills, fuzz, more parameters
 #   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
 #   bash tests/run.sh --strict  exit 1 for lint, format, types and layers too (.ci/run); --nightly and --full: types for every locked Python
 # --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:
@@ -27,7 +27,7 @@ done
 # simulate for long. A file that is new is in.
 long=(
     api checkpoint cli cluster comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes
-    motion native_windows notebook oracle plan progress random_scenes release report robust sensitivity statistics
+    motion native_windows notebook oracle plan progress random_scenes report robust sensitivity statistics
     stiff study survival target tight trust vectorised
 )
 

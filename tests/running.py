@@ -60,17 +60,6 @@ def integrate(scene: Scene):
     return steps, recording.record(), recording.samples[0].par
 
 
-def kept_steps(problem, par, start, rows: int, budget: int) -> list[np.ndarray]:
-    """Every accepted step of one sample, in the pieces that a record of so many rows is emptied in."""
-    lanes = Lanes(problem, 1, np.zeros((rows, rec.columns(problem.coordinates))))
-    lanes.queue(par, start, np.zeros(1, np.int64))
-    chunks = []
-    while lanes.pending:
-        lanes.step(budget)
-        chunks.append(lanes.take_record())
-    return chunks
-
-
 def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> Run:
     """Simulate; `effects` forces kernel flags, `par_changes` rows of parameters, `shift` adds to the start (2, n)."""
     problem = problem_of(scene, **options)

@@ -9,7 +9,7 @@ import pytest
 from margins import FALSE_RED, at_least, at_most, fewest, most
 from scipy.stats import chi2, f
 
-from hpcclear.accuracy import averaging, integration, random_inputs, spending, surrogate
+from hpcclear.accuracy import averaging, integration, random_inputs, spending
 from hpcclear.accuracy.looked_at import QUANTITIES
 from hpcclear.accuracy.profile import QUICK
 from hpcclear.accuracy.run import measure
@@ -20,7 +20,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.costs import advice, resolution
+from hpcclear.report.html.costs import advice
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -189,64 +189,7 @@ def test_a_run_that_was_cut_goes_on_as_if_it_had_not_been():
     np.testing.assert_array_equal(again.start, whole[1].start)
 
 
-class Shelf(dict):
-    """A store in memory."""
-
-    def save_stage(self, name, data):
-        self[name] = {key: np.asarray(value) for key, value in data.items()}
-
-    def load_stage(self, name):
-        return self.get(name)
-
-
-def test_what_was_measured_is_shown_at_once_and_not_measured_again(monkeypatch):
-    class Enough(Exception):
-        pass
-
-    def stop(*_):
-        raise Enough
-
-    shelf, shown, told = Shelf(), [], []
-    with monkeypatch.context() as patch:
-        patch.setattr(averaging, "measure", stop)
-        with pytest.raises(Enough):
-            measure(TWIN, alone(), TINY, told.append, shelf, shown.append)
-    assert "spent_error" in shown[0]
-    assert "error" not in shown[0]
-    assert "error" in shown[-1]
-    assert {"motion", "copies", "integration"} <= set(shelf)
-    told.clear()
-    monkeypatch.setattr(integration, "measure", stop)  # never called
-    content = measure(TWIN, alone(), TINY, told.append, shelf, shown.append)
-    assert content.attrs["motion"].endswith("revolutions)")
-    assert "regular" in content.attrs["motion"]
-    assert not [text for text in told if text in ("motion", "integration")]
-    np.testing.assert_array_equal(content["error"], shelf["integration"]["error"])
-
-
 # ---- surrogates and random inputs -----------------------------------------------------------------
-
-
-def test_a_study_with_another_kernel_is_shown_both():
-    variables = {"m2": {"range": [0.1, 0.4]}, "C": {"range": ["0.3 mm", "1 mm"]}}
-    scene, case, _ = with_case(PAPER.with_({"study": {"seed": 1, "variables": variables}}))
-    for kernel, names in (
-        (None, ("response surface", "Kriging")),
-        ("squared-exponential", ("response surface", "Kriging")),
-        ("matern-5/2", ("response surface", "Kriging", "Kriging, matern-5/2")),
-    ):
-        asked = scene.with_({"study.surrogate.kernel": kernel})
-        region = surrogate.region_of(asked, case)
-        designs = surrogate.designs_of(asked, case, TINY, surrogate._generator(asked))
-        unit = (np.concatenate(designs) - region.lower) / (region.upper - region.lower)
-        found, model = surrogate.measure(
-            asked, case, TINY, np.abs(unit[:, 0] - 0.4) + unit[:, 1], 1.0
-        )
-        assert tuple(found["surrogate"]) == names
-        assert found["r2"].shape == found["fit_seconds"].shape == (len(names), 2)
-        assert np.isfinite(found["leave_one_out"]).all()
-        assert model.kernel == "squared-exponential"
-    assert found["rmae"][2, 1] < found["rmae"][1, 1]  # of a kink
 
 
 def test_limits_of_a_root_mean_square_hold_as_often_as_they_say(shift):
@@ -329,15 +272,6 @@ def test_figures_and_tables(measured, tmp_path, capsys):
     ):
         assert word in shown
     assert len(advice(measured)) == 5
-
-
-def test_the_panel_says_when_the_reference_is_not_good_enough(measured):
-    exact = measured.copy(deep=True)
-    exact["reference_error"][:] = 0.0
-    assert "all errors shown" in resolution(exact, "slider_position")
-    spoilt = measured.copy(deep=True)
-    spoilt["reference_error"][:] = 1e-3
-    assert "not resolved" in resolution(spoilt, "slider_position")
 
 
 def test_without_clearance_there_is_nothing_to_measure():

@@ -18,9 +18,7 @@ from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import Body
-from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method
 from hpcclear.scene.planar import BarBending
-from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain
 
 CRANK, LENGTH, MASS, SLIDER = 0.15, 0.3, 0.151104, 0.075552  # Simeon's
@@ -584,15 +582,3 @@ def test_a_rod_that_its_inertia_buckles_is_warned_of():
     """Euler's load of the paper's rod is 685/m2 times its stiffness, and 4800 N the inertia."""
     assert any("buckles under 6.85e+03 N" in text for text in bending(stiffness=10.0).warnings)
     assert not any("buckles" in text for text in bending(stiffness=20.0).warnings)
-
-
-def test_a_scene_tells_of_its_bending():
-    scene = bending(modes=3)
-    assert scene.modes == 3
-    assert coordinate_count(scene) == 7
-    assert "bending of rod in 3 modes, 300 N m2" in scene.effects_on()
-    off = Off(scene, [one for one in switches(scene) if one.name == "bending of rod"])
-    assert off.scene.modes == 0
-    assert off.paths(["mechanism.rod.bending.stiffness"]) == ()
-    assert implicit_method(scene) == "never"
-    assert implicit_method(bending(stiffness=1e7, modes=4)) == "always"

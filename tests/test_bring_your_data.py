@@ -6,7 +6,6 @@ from pathlib import Path
 import kinds_of_tables
 import numpy as np
 import pytest
-import report_data as data
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -250,25 +249,6 @@ def test_a_column_of_names_is_kept(tmp_path):
     assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
     assert back["m2"].values.tolist() == [0.21, 0.18]
     assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
-
-
-def test_the_page_draws_the_tables_of_a_scene(tmp_path):
-    """Also of one that came from a file, whose values the result carries."""
-    from hpcclear.report.figures.catalogue import of_response
-    from hpcclear.report.figures.curves import tables_figure
-    from hpcclear.report.html.gallery import _png
-
-    (tmp_path / "p.csv").write_text("angle [deg],force [kN]\n0,1\n90,-0.5\n180,0\n270,0.2\n")
-    load = f'effects.slider_load={{file="{tmp_path / "p.csv"}"}}'
-    plain, loaded = (load_scene(JOBS / "slider_crank.toml", sets) for sets in ([], [load]))
-    found = data.response().assign_attrs(scene=loaded.text)
-    curve, rows = tables_figure(found).axes[0].get_lines()
-    assert [round(one, 9) for one in rows.get_ydata()] == [1.0, -0.5, 0.0, 0.2]
-    assert {1.0, -0.5, 0.2} <= {round(one, 6) for one in curve.get_ydata()}
-    assert tables_figure in [one.draw for one in of_response(found)]  # all are on the page
-    assert _png(lambda: tables_figure(found)) is not None
-    without = data.response().assign_attrs(scene=plain.text)
-    assert _png(lambda: tables_figure(without)) is None
 
 
 @pytest.mark.parametrize(

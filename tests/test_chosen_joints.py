@@ -8,9 +8,7 @@ from running import scene_with
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.api import as_points, evaluate
-from hpcclear.ensemble.samples import sample_points
-from hpcclear.ranks.boundary import alone
+from hpcclear.ensemble.api import evaluate
 
 ROOT = Path(__file__).parents[1]
 SHORT = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 2}
@@ -71,11 +69,3 @@ def test_a_choice_that_means_nothing_is_refused(joints, objective, said):
 def test_limits_are_of_all_joints():
     with pytest.raises(InputError, match="all joints"):
         of(scene_with({"numerics.target_error": 0.01}), "crank_rod")
-
-
-def test_ranks_know_the_choice():
-    """They get no study, and yet the objective of the joints that count."""
-    scene = of(load_scene(ROCKER), "o3", objective="peak-contact-force")
-    points = as_points(scene, {"mechanism.bodies.coupler.mass": [0.25, 0.3]})
-    records = sample_points(scene, points, alone())
-    np.testing.assert_array_equal(records["objective"], records["peak_contact_force"][:, 1])

@@ -173,6 +173,11 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
             "/proc/no/such",
         ),
         (["sample", "jobs/slider_crank.toml", "-o", "x.nc"], "study"),
+        (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--time-limit", "nan"], "--time-limit"),
+        (
+            ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--checkpoint-interval", "nan"],
+            "-interval",
+        ),
         (["frobnicate"], "No such command"),
         (
             ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--points", "README.md"],

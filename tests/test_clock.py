@@ -84,55 +84,14 @@ def test_numbers_and_names_are_no_clock_times(text):
     assert not is_clock(text)
 
 
-TABLES = {
-    "a heading of its own": (
-        "Timestamp;force [N]",
-        [f"{c};{k}.5" for k, c in enumerate(cells("%Y-%m-%d %H:%M:%S.%f"))],
-    ),
-    "date and time beside it": (
-        "Date;Time;force [N]",
-        [
-            f"{d};{c};{k}.5"
-            for k, (d, c) in enumerate(zip(cells("%d.%m.%Y"), cells("%H:%M:%S.%f"), strict=True))
-        ],
-    ),
-    "decimal commas": (
-        "time;force [N]",
-        [f"{c};{k},5" for k, c in enumerate(cells("%H:%M:%S,%f"))],
-    ),
-}
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_tables_of_signals_take_clock_times(name, tmp_path):
-    head, rows = TABLES[name]
-    path = tmp_path / "m.csv"
-    path.write_text("\n".join([head, *rows]) + "\n")
+def test_a_date_and_the_time_beside_it_are_one_clock(tmp_path):
+    path, rows = tmp_path / "m.csv", zip(cells("%d.%m.%Y"), cells("%H:%M:%S.%f"), strict=True)
+    rows = [f"{day};{clock};{k}.5" for k, (day, clock) in enumerate(rows)]
+    path.write_text("\n".join(["Date;Time;force [N]", *rows]) + "\n")
     table = read_series(path)
     (axis,), (force,) = table.axes, table.signals
     assert (axis, force.name) == ("time", "force")
     np.testing.assert_allclose(table.si(table.axes[axis], "s", ""), STEPS, atol=1e-9)
-    np.testing.assert_allclose(table.si(force, "N", ""), np.arange(6) + 0.5)
-    turned = [f"{row.rpartition(';')[0]};{72 * k}" for k, row in enumerate(rows)]
-    path.write_text("\n".join([head.replace("force [N]", "angle [deg]"), *turned]) + "\n")
-    made = load_scene(_linkage({"kind": "table", "body": "crank", "angle": {"file": str(path)}}))
-    np.testing.assert_allclose([row[0] for row in made.mechanism.drives[0].angle], STEPS, atol=1e-9)
-
-
-def _linkage(drive):
-    crank = {
-        "mass": 1.0,
-        "inertia": 1e-3,
-        "points": {"A": [0.0, 0.0], "B": [0.1, 0.0]},
-        "center": [0.0, 0.0],
-    }
-    return {
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar", "bodies": {"crank": crank}, "ground": {"points": {"A": [0.0, 0.0]}},
-            "joints": {"A": {"kind": "revolute", "journal": "crank.A", "bearing": "ground.A"}}, "drives": {"motor": drive},
-        },
-    }  # fmt: skip
 
 
 def test_dates_of_a_workbook_and_a_signal_of_a_sensor(tmp_path):

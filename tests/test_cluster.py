@@ -34,7 +34,7 @@ from patience import crowded
 
 from hpcclear.base.host import process_fields
 from hpcclear.ranks import launcher, life
-from hpcclear.ranks.watch import BEATS, Neighbour, Watch, silence
+from hpcclear.ranks.watch import Neighbour, silence
 
 REFUSAL = refusal()
 pytestmark = pytest.mark.timeout(900)
@@ -218,51 +218,6 @@ def test_statistics_of_several_nodes_are_those_of_one_process(box, tmp_path):
     assert code == 0, output
     assert len(contents(there)) == 1 + 5 + 1
     assert contents(there) == contents(here)
-
-
-class Silent:
-    """A mailbox whose neighbour sends so many pulses, then a goodbye or nothing."""
-
-    neighbours = (1,)
-
-    def __init__(self, beats: int, goodbye: bool = False, life: bool | None = None) -> None:
-        self._left, self._goodbye = beats, goodbye
-        self.life = life
-        self.sent: list[int] = []
-        self.listened = 0
-
-    def connect(self) -> None:
-        pass
-
-    def lives(self, rank: int) -> bool | None:
-        return self.life
-
-    def pulse(self, to: int, tag: int) -> None:
-        self.sent.append(tag)
-
-    def pulses(self) -> list[tuple[int, int]]:
-        self.listened += 1
-        self._left -= 1
-        if self._left == 0 and self._goodbye:
-            return [(1, 2)]
-        return [(1, 1)] if self._left > 0 else []
-
-
-def test_a_neighbour_is_given_up_once_and_not_when_it_said_goodbye():
-    for mail, losses, last in (
-        (Silent(50), [1], 2),
-        (Silent(50, goodbye=True), [], 1),  # no goodbye of ours to who is gone
-        (Silent(10**9), [], 2),
-        (Silent(50, life=True), [], 2),
-    ):
-        lost: list[int] = []
-        with Watch(mail, 0.06, lost.append, lambda: None):
-            patience = time.monotonic() + crowded(10.0)
-            while mail.listened < 80 * BEATS and time.monotonic() < patience:
-                time.sleep(0.01)
-        assert mail.listened >= 80 * BEATS
-        assert lost == losses
-        assert mail.sent[-1] == last
 
 
 def beats_until_lost(neighbour: Neighbour, lives: Iterable[bool | None], patience: float) -> int:

@@ -3,7 +3,6 @@
 Every mpiexec has a time-out of its own; a job that hangs is killed and fails its test.
 """
 
-import ctypes
 import os
 import pathlib
 import signal
@@ -11,7 +10,9 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 
+import commands
 import numpy as np
 import pytest
 from patience import crowded
@@ -24,7 +25,6 @@ from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
-MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 
 
 pytestmark = pytest.mark.mpi
@@ -32,29 +32,10 @@ pytestmark = pytest.mark.mpi
 
 def start(ranks: int, program: str, *arguments: object, **settings: str) -> subprocess.Popen:
     """Start a program on so many ranks; 0 is without mpiexec."""
-    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
-    environment = os.environ | settings
-    environment["PYTHONPATH"] = str(PROGRAMS.parent.parent)
-    return subprocess.Popen(
-        [*launch, sys.executable, str(PROGRAMS / program), *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=environment,
-        start_new_session=True,
-    )
+    return commands.start([*map(str, arguments)], ranks, (str(PROGRAMS / program),), **settings)
 
 
-def finish(job: subprocess.Popen, seconds: float = 30.0) -> tuple[int, str]:
-    """Exit code and output; kills a job that does not end (its ranks die with mpiexec)."""
-    try:
-        output, _ = job.communicate(timeout=crowded(seconds))
-    except subprocess.TimeoutExpired:
-        os.killpg(job.pid, signal.SIGKILL)
-        output, _ = job.communicate()
-        pytest.fail(f"the job did not end within {crowded(seconds):.0f} s:\n{output}")
-    return job.returncode, output
+finish = partial(commands.finish, seconds=30.0)
 
 
 def wait_for(path: pathlib.Path, job: subprocess.Popen) -> None:
@@ -220,16 +201,7 @@ def test_a_signal_is_obeyed_in_every_state(where, tmp_path):
 def test_a_signal_to_one_rank_only_stops_the_job(tmp_path):
     job = start(2, "stopping.py", "sampling", tmp_path)
     wait_for(tmp_path / "ready", job)
-    marks = [f"PMI_RANK={rank}".encode() for rank in (0, 1)]
-    ranks = {}
-    for process in pathlib.Path("/proc").glob("[0-9]*"):
-        try:
-            if str(tmp_path).encode() in (process / "cmdline").read_bytes():
-                environment = (process / "environ").read_bytes().split(b"\0")
-                ranks |= {i: int(process.name) for i in (0, 1) if marks[i] in environment}
-        except OSError:
-            continue
-    os.kill(ranks[1], signal.SIGTERM)
+    os.kill(commands.ranks_of(job)[1], signal.SIGTERM)
     code, output = finish(job)
     assert code == 3, output
     assert output.count("SIGTERM was received on rank 1") == 1
@@ -324,17 +296,3 @@ def test_every_library_is_kept_to_one_thread():
     root = PROGRAMS.parent.parent
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
     assert run.stdout.split() == ["{1}", "1"], run.stderr
-
-
-def test_a_library_that_cannot_be_looked_at_is_left_alone_in_silence(monkeypatch, capsys):
-    """As when file handles have run out, or its folder is another user's: threadpoolctl asks in a callback of C."""
-
-    @ctypes.CFUNCTYPE(None)
-    def callback():
-        raise OSError("Too many open files")
-
-    monkeypatch.setattr("threadpoolctl.threadpool_limits", lambda limits: callback())
-    hook = sys.unraisablehook
-    launcher.pin_threads()
-    assert capsys.readouterr().err == ""
-    assert sys.unraisablehook is hook

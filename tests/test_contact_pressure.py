@@ -68,30 +68,6 @@ def test_they_are_objectives_with_a_half_width(name):
     assert 0.0 <= float(alone["objective_uncertainty"]) < np.inf
 
 
-def test_a_constraint_takes_a_pressure_with_its_unit():
-    study = {
-        "objective": "impact-energy",
-        "variables": {
-            "C": {"range": ["20 um", "60 um"], "paths": [CLEARANCE]},
-            "m": {"range": [0.2, 0.3], "paths": ["mechanism.slider.mass"]},
-        },
-        "random": {"C": {"distribution": "uniform", "range": ["20 um", "60 um"]}},
-        "cases": {
-            "safe": {
-                "random": ["C"],
-                "objectives": ["mean"],
-                "constraints": [
-                    {"statistic": "quantile", "of": "peak-contact-pressure", "most": "60 MPa"}
-                ],
-            }
-        },
-    }
-    scene = short({"study": study})
-    (kept,) = scene.required_study.cases[0].constraints
-    assert kept.most == 60e6
-    assert kept.unit("J") == "Pa"
-
-
 def test_a_sphere_has_no_pressure():
     found = evaluate(short({"effects.contact": HERTZ_SPHERE}), {CLEARANCE: [3e-5]})
     assert "peak_contact_pressure" not in found

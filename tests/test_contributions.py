@@ -156,20 +156,3 @@ def test_a_chain_of_correlations_is_one_group_as_long_as_no_link_lacks():
     chain = Correlation(inputs=["a", "b", "c", "d"], matrix=matrix.tolist())
     assert chain.groups(["d", "c", "b", "a"]) == [0, 1, 1, 1]
     assert chain.groups(["a", "c", "d"]) == [0, 0, 0]
-
-
-def test_two_blocks_are_listed_as_two():
-    each = {name: (("design", "input"), [[0.3, 0.3, 0.2, 0.2, 0.1]]) for name in ("contribution", "halved")}  # fmt: skip
-    errors = {f"{name}_error": (("design", "input"), [[0.01] * 5]) for name in each}
-    content = xr.Dataset(
-        {
-            **each, **errors, "unexplained": ("design", [0.0]), "group": (("design", "input"), [[1, 1, 2, 2, 0]]),
-            "halved_together": ("design", [0.4321]), "halved_together_error": ("design", [0.004]),
-        },
-        {"design": ["case alpha"], "input": list("abcde")},
-    )  # fmt: skip
-    own = content.sel(design="case alpha")
-    assert [one[0] for one in scatter.shares(own)] == ["a+b (correlated)", "c+d (correlated)", "e"]
-    assert "them together lowers the standard deviation of f by 43% ± 1%" in "".join(
-        scatter.tighten(own)
-    )

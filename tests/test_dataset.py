@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import FIELDS, JOINTS, Status, failed, record_type
-from hpcclear.results import dataset, files, netcdf
+from hpcclear.results import dataset, netcdf
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.results.provenance import program
@@ -147,29 +147,6 @@ def test_long_attributes_and_empty_dimensions(tmp_path):
         assert found.attrs["scene"] == attributes["scene"]
 
 
-WRITE_IN_ANOTHER_PROCESS = """
-import sys
-sys.path.insert(0, {tests!r})
-import opened
-from test_dataset import example
-from hpcclear.results import dataset
-from hpcclear.results.names import designs_in
-for kind in dataset.KINDS:
-    opened.write(example(kind), f"{folder}/{{kind}}.nc")
-"""
-
-
-def test_equal_content_gives_equal_bytes_in_another_process_at_another_time(tmp_path):
-    code = WRITE_IN_ANOTHER_PROCESS.format(tests=str(Path(__file__).parent), folder=tmp_path)
-    subprocess.run(
-        [sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"}
-    )
-    for kind in KINDS:
-        here = tmp_path / "here.nc"
-        opened.write(example(kind), here)
-        assert here.read_bytes() == (tmp_path / f"{kind}.nc").read_bytes(), kind
-
-
 def test_a_written_file_has_the_permissions_of_an_ordinary_one(tmp_path):
     (tmp_path / "ordinary").write_bytes(b"")
     opened.write(samples(), tmp_path / "x.nc")
@@ -219,12 +196,6 @@ def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
     with pytest.raises(InputError, match="output"):
         opened.write(samples(), place)
     assert sorted(tmp_path.iterdir()) == before
-
-
-@pytest.mark.parametrize("case", PLACES)
-def test_a_probe_refuses_them_beforehand(tmp_path, case):
-    with pytest.raises(InputError, match="output"):
-        files.probe(places(tmp_path)[case])
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "replace"])
@@ -313,15 +284,6 @@ def test_files_that_are_not_there_or_no_files_are_refused(tmp_path):
     for place in (tmp_path / "none.nc", tmp_path, tmp_path / "pipe", Path("/dev/zero")):
         with pytest.raises(InputError):
             opened.read(place)
-
-
-def test_a_value_changed_with_h5py_is_noticed(tmp_path):
-    path = tmp_path / "x.nc"
-    opened.write(samples(), path)
-    with h5py.File(path, "r+") as file:
-        file["objective"][0] = 1.0
-    with pytest.raises(InputError, match="changed"):
-        opened.read(path)
 
 
 def test_a_file_of_another_kind_or_scene_is_refused(tmp_path):
@@ -441,23 +403,6 @@ def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, k
         assert sorted(flags) == sorted(codes)
         if "status" in found:
             np.testing.assert_array_equal(found["status"].cf == "ok", found["status"] == Status.OK)
-
-
-WITHOUT_XARRAY = """
-import sys
-from importlib import import_module
-for name in ("study", "study.stages", "accuracy.run", "identify.answer", "ensemble.statistics", "ensemble.wear",
-             "report.answer", "report.html.page", "report.figures.catalogue", "report.compare", "cli"):
-    import_module(f"hpcclear.{name}")
-print(sorted({"xarray", "pandas"} & set(sys.modules)))
-"""
-
-
-def test_commands_load_no_xarray():
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_XARRAY], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == "[]\n"
 
 
 def test_results_select_as_xarray_does():

@@ -206,18 +206,6 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
     assert int(best["rare_samples"]) > int(best["samples"])  # the rare failure needs more
 
 
-def test_check_states_what_a_rare_failure_costs():
-    study = scene_of(STUDY).required_study
-    (text,) = verdicts.costs(study, "m")
-    assert (
-        "probability of f above 0.00047 m at most 0.001: 3687 simulations of a design without"
-        in text
-    )
-    assert "12288 decide a design near it by importance sampling" in text
-    few = study.model_copy(update={"verification": Verification(samples=1024)})
-    assert "samples allows 1024, too few to decide" in next(verdicts.costs(few, "m"))
-
-
 @pytest.mark.parametrize("seed", range(10))
 def test_of_designs_that_always_fail_the_one_nearest_to_the_limit_violates_least(seed):
     """Random levels, scatters and limits: all probabilities are 1, or the scatter is a thousandth of the distance."""

@@ -14,14 +14,11 @@ import matplotlib.pyplot as plt
 import pytest
 import reference
 import start_page
-from browser import Browser
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
 from markdown_it import MarkdownIt
 from patience import crowded
 
 from hpcclear.cli import cli
-from hpcclear.results.names import KINDS
-from hpcclear.scene import load_scene
 
 BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
@@ -200,21 +197,6 @@ def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
             assert not re.match(r"(https?:)?//", address), f"{path} loads {address}"
 
 
-@pytest.mark.nightly
-def test_the_reference_is_complete(site):
-    commands = Site(site / "reference/commands.html").text
-    for name, command in cli.every().items():
-        for parameter in command.params:
-            assert all(word in commands for word in parameter.opts if word[0] == "-"), name
-    files = "".join(Site(page).text for page in site.glob("reference/files*.html"))
-    assert all(name in files for kind in KINDS.values() for name in (*kind.coords, *kind.data))
-    scene = "".join(Site(page).text for page in site.glob("reference/scene*.html"))
-    for path in load_scene(ROOT / "jobs/robust_slider_crank.toml").numeric_paths():
-        assert path.rpartition(".")[2] in scene, path
-    python = Site(site / "reference/python.html").text
-    assert all(f"{name}" in python for name in ("load_scene", "simulate", "evaluate", "InputError"))
-
-
 @pytest.mark.parametrize("name", reference.MADE)
 def test_the_reference_is_what_the_package_says(name):
     """`python docs/mkdocs/reference.py` writes it anew."""
@@ -231,26 +213,3 @@ def test_every_table_of_a_scene_has_an_example_and_every_entry_a_meaning():
     for name, part in tables.items():
         for row in re.findall(r"^\| `.*$", part, re.M):
             assert row.startswith("| `kind`") or not row.endswith("|  |"), f"{name}: {row}"
-
-
-@pytest.mark.nightly
-def test_a_reader_finds_entries_and_moved_sections(site):
-    """In a browser, without a server: the search leads to an entry, and a former anchor to where the section is now."""
-    browser, home = Browser(), site.as_uri()
-    for word, place in {
-        "stribeck_speed": "reference/scene-effects.html#effectsfriction",
-        "joints.guide": "reference/scene-slider-crank.html#jointsguide-of-kind-slide",
-        "deviation_within": "reference/files-study.html#verification",
-    }.items():
-        browser.visit(f"{home}/index.html?q={word}")
-        links = "[...document.querySelectorAll('.md-search-result__link')]"
-        browser.wait(f"{links}.find(link => link.href.includes('{place}'))")
-    for old, new in {
-        "reference/scene.html#studysensitivity": "reference/scene-study.html#studysensitivity",
-        "reference/files.html#what-a-response-contains": "reference/files-response.html#what-a-response-contains",
-        "theory.html#integration": "theory-numerics.html#integration",
-    }.items():
-        browser.visit(f"{home}/{old}")
-        browser.wait(f"location.href === '{home}/{new}'")
-        browser.wait(f"document.getElementById('{new.partition('#')[2]}')")
-    browser.close()

@@ -2,7 +2,6 @@
 
 import json
 import re
-from importlib import resources
 
 import numpy as np
 import opened
@@ -18,8 +17,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.report.export import FORMATS, export
 from hpcclear.report.tables import to_table
-from hpcclear.scene import load_scene
-from hpcclear.scene.loading import scene_of_text
 
 IDEAL = ['joints.crank_rod={kind="ideal"}', 'joints.rod_slider={kind="ideal"}', "effects.friction=none"]  # fmt: skip
 SHORT = ["numerics.transient_revolutions=0", "output.instants_per_revolution=60"]
@@ -82,11 +79,6 @@ def test_a_unit_that_fits_nothing_is_refused_with_those_that_do():
         to_table(data.samples(), ["rpm"])
     with pytest.raises(InputError, match="no result"):
         to_table(xr.Dataset())
-
-
-def test_places_of_a_grid_that_nothing_fills_have_no_row():
-    front = data.front()
-    assert len(to_table(front)) == int(front["mean"].notnull().sum()) < front["mean"].size
 
 
 def _read(path):
@@ -185,18 +177,6 @@ def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
         assert (tmp_path / f"s{ending}").read_text() == "mine"
 
 
-def test_the_command_says_what_it_wrote_and_which_formats_there_are(tmp_path):
-    opened.write(data.samples(), tmp_path / "s.nc")
-    done = CliRunner().invoke(
-        cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.csv")]
-    )
-    assert "60 rows" in done.output
-    done = CliRunner().invoke(
-        cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.doc")]
-    )
-    assert ".csv or .xlsx or .mat or .parquet" in str(done.exception)
-
-
 def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
     for name, failed in (("H7g6", 1), ("H7f7", 3)):
         made = data.samples(200, failed).assign_attrs(sampling="monte-carlo")
@@ -224,38 +204,5 @@ def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
         per = {"m": 1.0, "mm": 1e3, "um": 1e6}[table.loc["mean of f", "unit"]]
         assert mean == pytest.approx(per * float(known.mean()))
         assert lower < mean < upper
-    micro = [*words[:-1], str(tmp_path / "um.csv"), "--unit", "um"]
-    assert CliRunner().invoke(cli, ["export", *files, *micro]).exit_code == 0
-    again = pd.read_csv(tmp_path / "um.csv").set_index("statistic")
-    assert again.loc["mean of f", "unit"] == "um"
-    assert again.loc["mean of f", "H7f7 value"] == pytest.approx(
-        1e6 / per * table.loc["mean of f", "H7f7 value"]
-    )
     refused = CliRunner().invoke(cli, ["export", *files, "-o", str(tmp_path / "all.csv")])
     assert "Add --statistics" in str(refused.exception)
-
-
-def test_statistics_of_a_response_are_refused_with_how_to_make_samples(ideal, tmp_path):
-    opened.write(ideal, tmp_path / "one.nc")
-    words = [str(tmp_path / "one.nc"), "--statistics", "-o", str(tmp_path / "x.csv")]
-    done = CliRunner().invoke(cli, ["export", *words])
-    assert "need samples, and it holds a response. Make samples with hpcclear sample" in str(
-        done.exception
-    )
-
-
-def test_units_of_the_scene_file_are_kept_where_values_come_from_a_file(tmp_path):
-    starter = resources.files("hpcclear.cli").joinpath("compressor.toml").read_text()
-    curve = 'slider_load = { file = "load.csv" }\n'
-    scene = re.sub(r"^slider_load = \[\n.*?^\]\n", curve, starter, flags=re.S | re.M)
-    assert curve in scene
-    (tmp_path / "c.toml").write_text(scene)
-    (tmp_path / "load.csv").write_text("Crank angle [deg],Force [N]\n0,-900\n90,0\n270,-200\n")
-    text = load_scene(tmp_path / "c.toml", ["joints.crank_rod.fit=20 H7/g6"]).text
-    assert scene_of_text(text, "scene").joints.crank_rod.bearing_radius == pytest.approx(
-        0.01, rel=1e-2
-    )
-    made = data.samples(80, 1).assign_attrs(scene=text)
-    headings = list(to_table(made).columns)
-    assert "peak_contact_force crank_rod [N]" in headings
-    assert "mean_gap crank_rod [mm]" in headings

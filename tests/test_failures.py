@@ -5,17 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import report_data as data
-from click.testing import CliRunner
 
-from hpcclear.accuracy import plan as planning
 from hpcclear.base.outcome import OUTCOME, Status
-from hpcclear.cli import cli
 from hpcclear.cli.corners import lines
-from hpcclear.cli.plan import preview
 from hpcclear.dynamics import evaluation
 from hpcclear.ensemble.corners import MOST, corners, tried
-from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer
 from hpcclear.report.failures import SampledVariable, explained, where
 from hpcclear.scene import load_scene
 
@@ -83,15 +77,6 @@ def test_samples_say_by_which_status_where_and_what_to_do():
     assert text.endswith(f"Remedy: {Status.STEP_CAP.remedy}")
 
 
-def test_the_answer_explains_failures_in_lines_of_their_own():
-    samples, count = failing_samples()
-    told = answer({"verification": data.verification(), "samples": samples})
-    (text,) = [line.text for line in told if line.label == "failed"]
-    assert text.startswith(f"{count} of 60 samples step_cap")
-    plain = answer({"verification": data.verification(), "samples": data.samples(failed=0 + 1)})
-    assert len([line for line in plain if line.label == "failed"]) == 1
-
-
 # -- corners ---------------------------------------------------------------------------------------------
 
 
@@ -114,16 +99,6 @@ def test_all_corners_are_tried_and_those_that_make_no_mechanism_named():
     assert told["corners"] == "4 (all corners): 3 can be assembled"
     assert told["refused"].startswith("1 of 4 corners: ")
     assert "rod" in told["refused"]
-
-
-def test_check_prints_the_corners(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(crank_and_rod().to_toml())
-    done = CliRunner().invoke(cli, ["check", str(path), "--no-cost", "--details"])
-    shown = " ".join(done.output.split())
-    assert done.exit_code == 0
-    assert "Corners of the study's ranges" in shown
-    assert "3 can be assembled" in shown
 
 
 @pytest.mark.parametrize(("shortest", "word"), [(0.01, "assembled"), (0.088, "cannot turn")])
@@ -178,25 +153,3 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
 
 
 # -- plans in stages -------------------------------------------------------------------------------------
-
-
-def test_a_plan_answers_row_by_row(monkeypatch, capsys):
-    """A first look at once, then each rung as it is measured, and its samples counted meanwhile."""
-    monkeypatch.setattr(planning, "_busy", lambda *others: (1e-3, np.zeros(1, OUTCOME)))
-    monkeypatch.setattr(planning, "cost", lambda scene, *others: (2e-3, np.zeros(1, OUTCOME)))
-    monkeypatch.setattr(planning.wording, "in_short", lambda *given: "")
-    seen: list[str] = []
-    variables = {"m3": {"range": [0.07, 0.28]}}
-    scene = load_scene(JOBS / "hunt_crossley.toml").with_(
-        {"study": {"samples": 10_000, "variables": variables}}
-    )
-    found = planning.measure(
-        scene, alone(), (1e-2, 1e-3), show=lambda made: seen.append(preview(made, 2))
-    )
-    assert len(found.rows) == 3
-    assert len(seen) == 3
-    assert seen[0].startswith(
-        "first look, settings of the file: 1 ms per sample, 10000 simulations"
-    )
-    assert seen[1].startswith("settings of the file: 2 ms per sample, 10000 simulations take ")
-    assert seen[2].startswith("error 0.01: ")

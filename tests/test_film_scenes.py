@@ -12,7 +12,6 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import implicit_method
 from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.switches import Off, switches
 
 JOINTS = ("crank_rod", "rod_slider")
 CLOSED = 2e-5  # the bound of the library of hard scenes at 1e-6
@@ -167,20 +166,6 @@ def test_a_scene_tells_of_its_films():
     ):
         assert any(word in text for text in oiled(**film).warnings)
     assert load_scene(SCENE).films() == {}
-
-
-def test_a_film_is_an_effect_that_may_be_switched_off():
-    scene = oiled(joints=["crank_rod"])
-    (film,) = [one for one in switches(scene) if "film" in one.name]
-    off = Off(scene, [film])
-    assert film.name == "oil film in crank_rod"
-    assert off.scene.films() == {}
-    assert off.scene.clearance_joints() == JOINTS
-    assert off.paths(["joints.crank_rod.film.viscosity", "joints.crank_rod.clearance"]) == (
-        "joints.crank_rod.clearance",
-    )
-    both = Off(scene, [one for one in switches(scene) if one.joint == "crank_rod"] + [film])
-    assert both.scene.clearance_joints() == ("rod_slider",)
 
 
 def test_numbers_of_a_film_may_be_varied():

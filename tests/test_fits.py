@@ -274,22 +274,3 @@ def test_random_fits_that_are_none(row, words):
     with pytest.raises(InputError) as error:
         studied({"study.random.C12": {"distribution": "fit", **row}})
     assert words in str(error.value)
-
-
-def test_a_share_of_the_number_it_is_about():
-    row = {"path": "joints.crank_rod.clearance", "distribution": "uniform", "half_width": "3 %"}
-    scene = studied({"study.random.c": row})
-    assert scene.study.random_input("c").half_width == pytest.approx(9e-6, rel=1e-12)
-    mean = studied({"study.random.c": {**row, "mean": "0.2 mm"}})
-    assert mean.study.random_input("c").half_width == pytest.approx(6e-6, rel=1e-12)
-    mass = {"distribution": "normal", "deviation": "2%", "path": "mechanism.slider.mass"}
-    assert studied({"study.random.x": mass}).study.random_input("x").deviation == pytest.approx(
-        2.8e-3
-    )
-    moved = studied({"study.random.m2": {"distribution": "uniform", "half_width": "3 %"}})
-    row = moved.study.random_input("m2")
-    assert row.relative
-    assert moved.study.law(row, {"m2": 0.3}).span == pytest.approx((-9e-3, 9e-3))
-    bare = {"path": "mechanism.rod.mass", "distribution": "uniform", "half_width": "much %"}
-    with pytest.raises(InputError, match="half_width"):
-        scene_with({"study.variables.C": {"range": [1e-4, 2e-4]}, "study.random.m": bare})

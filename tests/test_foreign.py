@@ -97,16 +97,6 @@ def test_designs_that_fail_stand_on_no_front():
     assert len(nothing.values) == 0
 
 
-def test_directions_are_as_many_as_designs_or_fewer():
-    for objectives in (2, 3, 4, 5):
-        for most in (8, 50, 100):
-            made = foreign._directions(objectives, most)
-            assert objectives <= len(made) <= most
-            np.testing.assert_allclose(made.sum(axis=1), 1.0)
-    assert len(foreign._directions(2, 50)) == 50
-    assert len(foreign._directions(3, 100)) == 91
-
-
 # -- in a study -------------------------------------------------------------------------------------
 
 

@@ -136,12 +136,9 @@ def evil(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("command", ["reproduce", "report", "crate"])
 def test_escape_sequences_of_results_stay_in_them(evil, command):
-    done = subprocess.run(
-        [sys.executable, "-m", "hpcclear", command, str(evil)],
-        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=crowded(120.0),
-    )  # fmt: skip
-    assert done.stdout + done.stderr
-    assert not controls(done.stdout + done.stderr)
+    _, output = warm_command(command, evil)
+    assert output
+    assert not controls(output)
 
 
 SPELLINGS = {

@@ -269,26 +269,6 @@ def test_a_law_without_what_belongs_to_a_part_is_told_so(kind, keys, tmp_path):
         assert text not in str(error)
 
 
-@pytest.mark.parametrize(
-    ("kind", "entries", "said"),
-    [
-        ("ContactLaw", "factor=factor", "factor without elastic"),
-        ("ContactLaw", "elastic=force", "declares no force"),
-        ("FrictionLaw", "once=once", "declares no ratio"),
-        ("FrictionLaw", "ratio=ratio, deflection=slip", "deflection without largest"),
-        ("ContactLaw", "force=force, numbers={'own': 'N'}", "without once"),
-        ("ContactLaw", "force=force, parameters=('b',)", "has the parameter 'b'"),
-        ("ContactLaw", "force=force, parameters=(Parameter('b c', ''),)", "is not a name"),
-        ("ContactLaw", "force=force, parameters=(Parameter('b', 'm**9**9**9'),)", "is not known"),
-        ("ContactLaw", "force=lambda depth: depth", "is not a function written with def"),
-    ],
-)
-def test_what_a_law_lacks_is_named(kind, entries, said, tmp_path):
-    with pytest.raises(InputError) as caught:
-        load_scene(law_file(tmp_path, f"LAW = {kind}({BARE}, {entries})\n", kind), trust=True)
-    assert said in caught.value.reason
-
-
 STEPS = "\n".join(f"    a{k} = a{k - 1} / 2 + a{k - 1} / 2" for k in range(1, 60))
 DOUBLING = f"a0 = stiffness\n{STEPS}\n    return a59 * depth**1.5"
 """Names of constant parts, each of which has the one before twice."""

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from running import HUNT_CROSSLEY, LATCHED, scene_with
 
-from hpcclear.base.objectives import RATE, asked
+from hpcclear.base.objectives import RATE
 from hpcclear.base.outcome import LEVELS, ON_REQUEST, RESPONSES, WIDEST
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.samples import sample_points
-from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
 from hpcclear.scene.points import Points
@@ -88,18 +86,6 @@ def test_what_is_not_asked_for_is_not_a_number_and_not_in_the_file(objective):
     content = dataset.samples_dataset((), np.empty((1, 0)), {}, records)
     assert not set(ON_REQUEST) & set(content.data_vars)
     assert dataset.records(content).tobytes() == records.tobytes()
-
-
-@pytest.mark.parametrize("how", ["study", pytest.param("numerics", marks=pytest.mark.full)])
-def test_ranks_know_what_a_study_asks_for(how):
-    """Ranks get no study: what its objective needs must reach them all the same."""
-    scene = asking({}) if how == "study" else asking({"numerics.responses": True}, "mean-gap")
-    points = Points(("C",), np.array([[2e-4], [3e-4]]), (("joints.crank_rod.clearance",),))
-    records = sample_points(scene, points, alone())
-    here = asked(evaluate_records(scene, points, lanes=DEFAULT_LANES), scene.objective)
-    assert records.tobytes() == here.tobytes()
-    told = [name for name in RESPONSES if "point" not in name]  # no point is followed
-    assert all(np.isfinite(records[name]).all() for name in told)
 
 
 WORN = {"joints.crank_rod.wear": {"length": 0.02, "journal": {"coefficient": 1e-15}}}

@@ -11,7 +11,6 @@ from click.testing import CliRunner
 from doc_pages import ROOT
 
 import hpcclear
-from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.ensemble import single
@@ -28,7 +27,6 @@ from hpcclear.identify.posterior import sequential
 from hpcclear.identify.settings import Settings
 from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
 from hpcclear.identify.training import Ensemble, prepared_scene
-from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
 from hpcclear.results.content import Results
 from hpcclear.results.signals import signals_in
@@ -477,19 +475,6 @@ def test_the_command_prints_intervals_growth_and_advice(identified):
     assert (ends[:, 0] < [42e-6, 60e-6]).all()
     assert (ends[:, 2] > [42e-6, 60e-6]).all()
     assert content["interval"].attrs["units"] == "m"
-
-
-def test_the_page_and_the_figures_show_it(identified, tmp_path):
-    place = identified[0]
-    page = write_report(place, output=tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "Unknowns of the machine" in page
-    assert "was left out" not in page
-    content = opened.read(place)
-    for draw in (report.posterior_figure, report.features_figure, report.growth_figure):
-        assert draw(content).axes
-    assert len(hpcclear.to_table(content)) == 1
-    with pytest.raises(InputError, match="no signal"):
-        report.posterior_figure(content.drop_vars("interval"))
 
 
 def test_an_answer_is_never_more_certain_than_it_is(identified):

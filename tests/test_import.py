@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from commands import run
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
@@ -91,18 +90,3 @@ def test_a_name_of_two_words_is_no_pair_of_bodies(body, sign, tmp_path):
     """Signs between bodies may stand within a name: "rocker-arm" at each of its points would be two bodies in one place."""
     with pytest.raises(InputError, match="neither moves against the other"):
         made(tmp_path, FOUR_BAR.replace(body, f"{body}{sign}arm"))
-
-
-def test_the_command_writes_a_scene_and_a_sketch(tmp_path):
-    (tmp_path / "points.csv").write_text(FOUR_BAR)
-    words = [str(tmp_path / name) for name in ("points.csv", "linkage.toml")]
-    code, output = run(["init", "--import", *words, "--sketch", str(tmp_path / "sketch.png")], 0)
-    assert code == 0, output
-    assert "3 bodies, 4 joints" in output
-    assert (tmp_path / "sketch.png").stat().st_size > 10_000
-    before = (tmp_path / "linkage.toml").read_text()
-    code, _ = run(["init", "--import", *words], 0)
-    assert code == 2
-    assert (tmp_path / "linkage.toml").read_text() == before
-    code, output = run(["check", words[1], "--no-cost"], 0)
-    assert code == 0, output

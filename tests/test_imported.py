@@ -106,18 +106,6 @@ def test_a_slider_of_pmks_may_be_one_joint(tmp_path):
         linkage_of(tmp_path / "p")
 
 
-def test_inputs_of_pmks_have_the_speed_of_the_project_or_their_own(tmp_path):
-    made = files.machine(np.random.default_rng(4), 0, 2)
-    text = files.project(made).decode().split(".")
-    first = next(k for k, one in enumerate(text) if one[1:2] == "A")
-    text[first] = text[first].rsplit(",", 4)[0]
-    data = ".".join(text)[:-1]
-    (tmp_path / "p").write_bytes((data + files.DIGITS[len(data) % 62]).encode())
-    drives = linkage_of(tmp_path / "p")["mechanism"]["drives"]
-    speeds = [float(row["speed"].split()[0]) for row in drives.values()]
-    assert speeds == [-20.0, list(made.speeds.values())[1]]
-
-
 @pytest.mark.parametrize("code", [*_UNITS, 0, 25])
 def test_all_units_of_drawings(code, tmp_path):
     sizes = {
@@ -258,13 +246,6 @@ def test_what_has_no_counterpart_is_said(tmp_path):
     (tmp_path / "l").write_bytes(fastened)
     with pytest.raises(InputError, match="fastened"):
         drawing_of(tmp_path / "l")
-
-
-def test_no_body_is_driven_by_chance(tmp_path):
-    trammel = "name;x [mm];y [mm];bodies;slide\nA;0;40;bar;90\nB;30;0;bar;0\nK;15;20;bar;\n"
-    (tmp_path / "t.csv").write_text(trammel)
-    with pytest.raises(InputError, match="states no drive, and no body turns about a pin"):
-        linkage_of(tmp_path / "t.csv")
 
 
 def _points(count, layer, place):

@@ -4,14 +4,12 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import commands
 import opened
 import pytest
-from patience import crowded
 
 pytestmark = pytest.mark.mpi
 TWO_RANKS = pytest.param(2, marks=pytest.mark.nightly)
@@ -66,30 +64,12 @@ def test_a_full_disk_ends_in_a_message_and_keeps_what_is_there(small_disk, compi
     assert opened.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
 
 
-def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[int, str]:
-    """Exit code and output of a command under a resource limit (what ulimit sets)."""
-    limit = f"import os, resource, sys; resource.setrlimit({kind}, ({amount}, {amount}))\n"
-    limit += "os.execvp(sys.argv[1], sys.argv[1:])"
-    launch = [str(commands.MPIEXEC), "-n", str(ranks)] if ranks else []
-    done = subprocess.run(
-        [*launch, sys.executable, "-c", limit, sys.executable, "-m", "hpcclear", *words],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(commands.ROOT)},
-        timeout=crowded(120),
-        check=False,
-    )
-    return done.returncode, done.stdout
-
-
 def test_a_limit_on_file_sizes_ends_in_a_message(tmp_path, compiled):
     earlier = tmp_path / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
     words = commands.sample(tmp_path / "samples.nc", 4000, *OPTIONS)
     # one process: the limit would refuse MPI its shared memory, which counts as a file
-    code, output = limited(resource.RLIMIT_FSIZE, 60_000, words, 0)
+    code, output = commands.limited(resource.RLIMIT_FSIZE, 60_000, words)
     assert code == 1, output
     assert "Traceback" not in output
     assert output.count("ulimit -f") == 1, output
@@ -106,7 +86,7 @@ def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, comp
     earlier = tmp_path / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
     words = commands.sample(tmp_path / "samples.nc", 500_000_000, *OPTIONS)
-    code, output = limited(resource.RLIMIT_AS, 4_000_000_000, words, ranks)
+    code, output = commands.limited(resource.RLIMIT_AS, 4_000_000_000, words, ranks)
     assert code == 1, output
     assert output.count("out of memory") == 1, output
     assert "Traceback" not in output

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import overrides, run
 from dense_linkage import Contact, Dense, comes_as
 
 from hpcclear import load_scene, simulate
@@ -280,13 +279,9 @@ def test_samples_are_the_scenes_with_their_numbers():
         *(pytest.param(n, marks=pytest.mark.full) for n in NAMES if n not in ("press", "four_stroke")),
     ]
 )  # fmt: skip
-def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
-    """And a sample comes to the bits of a single response by the same method."""
-    sets = (
-        "numerics.transient_revolutions=0",
-        "numerics.averaged_revolutions=1",
-        "study.samples=12",
-    )
+def test_bytes_are_the_same_for_any_lanes(name):
+    """Those of ranks are in `test_kills`."""
+    sets = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
     scene = load_scene(LINKAGES / f"{name}.toml", sets)
     columns = {"C": np.linspace(*scene.required_study.variable("C").range, 9)}
     one, many = (
@@ -294,14 +289,6 @@ def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
         for lanes in (1, DEFAULT_LANES)
     )
     assert one.tobytes() == many.tobytes()
-    files = []
-    for ranks in (1, 2):
-        out = tmp_path / f"{ranks}.nc"
-        words = ["sample", str(LINKAGES / f"{name}.toml"), "-o", str(out), *overrides(*sets)]
-        code, output = run(words, ranks)
-        assert code == 0, output
-        files.append(out.read_bytes())
-    assert files[0] == files[1]
 
 
 def test_a_sample_that_does_not_close_has_failed_and_the_others_go_on():
@@ -383,15 +370,6 @@ def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
             load_scene({**content, table: value})
     with pytest.raises(InputError, match="belongs to a slider-crank"):
         rocker("effects.slider_load=3")
-
-
-def test_what_is_on_is_named_all_of_it():
-    """Of a slider-crank and of a linkage: a guide's friction and waves around a bearing as well."""
-    press = load_scene(LINKAGES / "press.toml")
-    waves = {"mechanism.joints.o3.out_of_round": {"bearing": {"cosine_2": 1e-6}}}
-    assert "guide friction in guide, coefficient 0.05" in press.effects_on()
-    assert "joint o3 out of round" not in press.effects_on()
-    assert "joint o3 out of round" in press.with_(waves).effects_on()
 
 
 def test_a_row_like_another_takes_over_what_its_tables_do_not_say():

@@ -9,18 +9,16 @@ from scipy.integrate import solve_ivp
 from some_laws import row
 
 from hpcclear import simulate
-from hpcclear.base.bits import falling
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
+from hpcclear.dynamics.setup.problem import coordinate_count, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.laws.friction import lugre
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.switches import Off, switches
 
 LUGRE = {
     "law": "lugre",
@@ -41,14 +39,6 @@ def bristled(changes=None, rtol=1e-6, revolutions=1, **friction) -> Scene:
 
 
 # ---- the law -----------------------------------------------------------------------------------------------
-
-
-def test_the_exponential_is_as_good_as_the_library_s():
-    x = np.concatenate([np.linspace(0, 700, 20001), 10.0 ** np.arange(-20, 3)])
-    ours = np.array([falling(one) for one in x])
-    np.testing.assert_allclose(ours, np.exp(-x), rtol=4.5e-16)
-    assert [falling(one) for one in (0.0, 1e9, math.inf)] == [1.0, falling(700.0), falling(700.0)]
-    assert math.isnan(falling(math.nan))
 
 
 @pytest.mark.parametrize("speed", [-3.0, -0.01, -1e-5, 1e-5, 0.004, 0.02, 10.0])
@@ -328,15 +318,3 @@ def test_points_keep_friction_at_rest_above_that_of_sliding():
     assert parameters(scene, points)[
         :, at.JOINTS[0].block + row("friction", "lugre", "coefficient")
     ].tolist() == [0.05, 0.15]
-
-
-def test_a_scene_tells_of_its_bristles():
-    scene = bristled()
-    assert scene.bristles == 2
-    assert coordinate_count(scene) == 6
-    assert implicit_method(scene) == "stiff"
-    assert "friction lugre, coefficient 0.1" in scene.effects_on()
-    friction = next(one for one in switches(scene) if one.name == "friction in joints")
-    off = Off(scene, [friction])
-    assert off.scene.bristles == 0
-    assert off.paths(["effects.friction.bristle_stiffness"]) == ()

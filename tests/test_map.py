@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from hpcclear import grid
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime
-from hpcclear.base.units import noting
 from hpcclear.cli import cli
 from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 from hpcclear.dynamics.evaluation.steady.mapping import mapped
@@ -125,15 +124,3 @@ def test_a_map_folds_back_into_a_grid(tmp_path):
     content.attrs = {}
     with pytest.raises(InputError):
         grid(content)
-
-
-def test_a_plain_speed_on_an_axis_is_told_in_rpm_and_an_unknown_path_has_those_alike_first():
-    scene, noted = load_scene("jobs/hunt_crossley.toml"), []
-    with noting(lambda text, read: noted.append(f"{text}: {read}")):
-        axis(scene, "drive.speed=200:800:3")
-        axis(scene, "drive.speed=200 rpm:800 rpm:3")
-        axis(scene, "joints.crank_rod.clearance=1e-4:2e-4:3")
-    assert [one for one in noted if "1909.9 rpm" in one or "7639.4 rpm" in one] == noted
-    assert len(noted) == 2
-    with pytest.raises(InputError, match=r"Use one of: joints\.crank_rod\.clearance"):
-        axis(scene, "clearance=1e-4:2e-4:3")

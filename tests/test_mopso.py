@@ -142,13 +142,6 @@ def test_archive_never_holds_dominated_points_and_keeps_its_size(function):
         assert np.array_equal(archive.min(axis=0), best)  # alpha and beta are never lost
 
 
-def test_of_equal_objectives_the_first_stays():
-    archive = Archive(10, np.empty((0, 1)), np.empty((0, 0)))
-    archive.add(np.array([[0.1], [0.2]]), np.array([[1.0, 2.0], [1.0, 2.0]]))
-    archive.add(np.array([[0.3]]), np.array([[1.0, 2.0]]))
-    assert archive.positions.tolist() == [[0.1]]
-
-
 def test_full_archive_drops_the_most_crowded():
     first = np.array([0.0, 0.3, 0.31, 0.6, 1.0])
     archive = Archive(4, np.empty((0, 1)), np.empty((0, 0)))
@@ -377,14 +370,3 @@ def test_start_designs_are_evaluated_first():
         [(2, 4), (-1, 1)], 5, np.random.default_rng(0), start=[[2.5, 0.25], [4.0, -1.0]]
     )
     assert np.allclose(swarm.ask()[:2], [[2.5, 0.25], [4.0, -1.0]], rtol=0, atol=1e-15)
-
-
-def test_remark_is_honest():
-    assert run(zdt1, 5, 0, 100).settled
-    assert run(zdt1, 5, 0, 100).remark.startswith("settled")
-    early = run(zdt1, 30, 0, 10)
-    assert not early.settled
-    assert early.remark.startswith("still improving")
-    assert early.gain > 1e-3
-    alone = run(lambda x: np.stack([x.sum(axis=1), x.sum(axis=1)], axis=1), 3, 0, 60)
-    assert "one point only" in alone.remark

@@ -190,7 +190,8 @@ def test_a_place_at_which_another_process_works_is_refused(busy, command):
     assert not contents(busy)
 
 
-@pytest.mark.parametrize("command", [sample, statistics, raw, run], ids=lambda c: c.__name__)
+@pytest.mark.parametrize("command", [sample, raw, statistics, run], ids=lambda c: c.__name__)
+@pytest.mark.shortened(2)  # an edited study is in test_own_models
 def test_the_same_command_finds_its_results_and_another_seed_does_not(
     tmp_path, command, monkeypatch
 ):
@@ -339,19 +340,3 @@ def test_a_name_that_promises_another_format_is_refused(tmp_path, command, endin
     assert "NetCDF" in said
     assert "x.nc" in said
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("ending", [".nc", ".nc4", ".NC", ".h5", ""])
-def test_names_of_netcdf_are_taken(tmp_path, ending):
-    words = ["simulate", str(tmp_path / "none.toml"), "-o", str(tmp_path / f"x{ending}")]
-    done = CliRunner().invoke(cli, words)
-    assert isinstance(done.exception, InputError)
-    assert done.exception.key == "scene file"
-
-
-def test_directories_above_a_result_are_made_wherever_they_are(tmp_path, monkeypatch):
-    from hpcclear.cli.options import place_of
-
-    monkeypatch.chdir(tmp_path)
-    for output in (Path("a/b/c/x.nc"), tmp_path / "d" / "e" / "f" / "x.nc"):
-        assert place_of(output).parent.is_dir()

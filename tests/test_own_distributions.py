@@ -1,16 +1,13 @@
 """Distributions from elsewhere: any continuous one of scipy.stats, a file's beside the scene, an installed package's."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import opened
 import pytest
-from commands import CHEAP, MPIEXEC, overrides
+from commands import CHEAP, overrides, run
 from scipy import stats
-from test_plugins import install
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.identity import run_key
@@ -55,12 +52,6 @@ def scene_file(tmp_path: Path) -> Path:
     file = tmp_path / "scene.toml"
     file.write_text(QUICKSTART.read_text())
     return file
-
-
-def _command(*words: str, ranks: int = 0) -> subprocess.CompletedProcess[str]:
-    launcher = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
-    command = [*launcher, sys.executable, "-m", "hpcclear", *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
 
 
 def _law(file: Path, entry: str):
@@ -140,41 +131,22 @@ def test_the_file_is_part_of_the_scene_and_needed_no_more(scene_file):
         scene_of_text(scene.text, "samples.nc")
 
 
-def test_a_package_s_is_found_and_its_version_kept(tmp_path, monkeypatch):
-    install(tmp_path, "hpcclear.distributions", "falling", "their_laws:Falling", "their-laws")
-    (tmp_path / "their_laws.py").write_text(TRIANGLE)
-    monkeypatch.syspath_prepend(tmp_path)
-    entry = 'study.random.C={distribution="falling", start="0.4 mm", width="300 um"}'
-    scene = load_scene(QUICKSTART, [entry])
-    assert scene.resolved()["plugins"]["packages"] == {"their-laws": {"version": "1.2"}}
-    assert run_key(scene, "sample")["plugins.packages.their-laws.version"] == '"1.2"'
-    assert 'version = "1.2"' in scene.text
-    assert scene_of_text(scene.text, "samples.nc").hash == scene.hash
-
-
-def test_check_prints_the_parameters(scene_file):
-    done = _command("check", str(scene_file), "--no-cost", "--details", "--set", FALLING)
-    assert done.returncode == 0, done.stderr
-    printed = " ".join(done.stdout.split())
-    assert "mylaws:Falling(start = 0.0004, width = 0.0003), 0.4 mm" in printed
-
-
 @pytest.mark.mpi
 @pytest.mark.timeout(600)
 def test_results_carry_the_source_and_reproduce_runs_it_only_when_trusted(scene_file, tmp_path):
     results = {ranks: tmp_path / f"of_{ranks}" / "samples.nc" for ranks in (0, 2)}
     sets = overrides(FALLING, "study.method=monte-carlo", "study.samples=50", *CHEAP)
     for ranks, result in results.items():
-        done = _command("sample", str(scene_file), "-o", str(result), *sets, ranks=ranks)
-        assert done.returncode == 0, done.stderr
+        code, told = run(["sample", str(scene_file), "-o", str(result), *sets], ranks)
+        assert code == 0, told
     assert results[0].read_bytes() == results[2].read_bytes()
     clearance = opened.read(results[0])["C"].to_numpy()
     assert ((clearance > 4e-4) & (clearance < 7e-4)).all()
     (tmp_path / "mylaws.py").unlink()
-    refused = _command("reproduce", str(results[0].parent))
-    assert refused.returncode == 1
-    assert "mylaws.py (SHA-256" in refused.stdout
-    assert "--trust" in refused.stdout
-    trusted = _command("reproduce", str(results[0].parent), "--trust")
-    assert trusted.returncode == 0, trusted.stdout + trusted.stderr
-    assert "16 of 50 samples: the same" in trusted.stdout
+    code, told = run(["reproduce", str(results[0].parent)], 0)
+    assert code == 1
+    assert "mylaws.py (SHA-256" in told
+    assert "--trust" in told
+    code, told = run(["reproduce", str(results[0].parent), "--trust"], 0)
+    assert code == 0, told
+    assert "16 of 50 samples: the same" in told

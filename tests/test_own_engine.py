@@ -13,10 +13,9 @@ from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OURS
-from hpcclear.cli.printing import describe_response, describe_run
+from hpcclear.cli.printing import describe_response
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
-from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import labels
 from hpcclear.scene import load_scene
@@ -90,20 +89,6 @@ def test_the_objective_asked_for_is_what_sample_evaluate_and_simulate_call_objec
     response = hpcclear.simulate(scene.with_({"joints.crank_rod.clearance": 30e-6}))
     assert response["objective"].attrs["units"] == UNITS[name]
     assert float(response["objective"]) == pytest.approx(float(evaluated["objective"][0]), rel=0.05)
-
-
-def test_streamed_statistics_are_of_the_objective_asked_for(tmp_path):
-    more = ("study.objective=peak-contact-force", "study.method=monte-carlo")
-    scene = engine(*QUICK, *more)
-    samples = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")).content
-    found = run_statistics(scene, tmp_path / "b.nc", alone(), options=Options(style="quiet"))
-    mean = float(np.nanmean(samples["objective"]))
-    assert float(found.content["objective_mean"]) == pytest.approx(mean, rel=1e-12)
-    assert found.content["objective_mean"].attrs["units"] == "N"
-    assert int(found.content["objective_spread_count"]) == 0
-    describe_run(found, "statistics")
-    again = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet"))
-    describe_run(again, "samples", details=True)
 
 
 @pytest.mark.parametrize(

@@ -104,12 +104,6 @@ def test_two_ranks_give_the_same_bytes(results, tmp_path):
     assert contents(made) == contents(results / "out")
 
 
-def test_a_study_in_pieces_ends_with_the_same_bytes(results, tmp_path):
-    scene = load_scene(results / "scene.toml")
-    assert formula.run_in_pieces(scene, tmp_path / "out", alone()) > 3
-    assert contents(tmp_path / "out") == contents(results / "out")
-
-
 def test_an_edited_file_is_another_run(results, tmp_path):
     edited = load_scene(written(tmp_path / "edited", FOREST.replace("20", "21")))
     with pytest.raises(InputError, match="mymodels"):
@@ -278,6 +272,7 @@ def test_no_search_is_refused_before_anything_is_simulated(tmp_path, search, sai
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.nightly  # algorithms of pymoo by name are in test_foreign
 def test_an_algorithm_of_pymoo_with_settings_of_ones_own_is_a_search(tmp_path):
     text = "from pymoo.algorithms.moo.nsga2 import NSGA2\nRandom = NSGA2(pop_size=10)\n"
     scene = load_scene(written(tmp_path / "scene", search=text))

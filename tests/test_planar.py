@@ -17,7 +17,7 @@ from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import Planar, PlanarClearance
 from hpcclear.scene.validation import validated
 
 TEXT = """
@@ -175,15 +175,3 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     first = row("contact", scene.effects.contact.law, "stiffness")
     found = [par[0, one.block + first] for one in at.JOINTS[:2]]
     np.testing.assert_allclose(expected, found, rtol=1e-15)
-
-
-def test_guide_friction_and_load_are_written_out_too():
-    scene = scene_with(
-        {"effects.guide_friction": {"coefficient": 0.1}, "effects.slider_load": -50.0}, 1
-    )
-    mechanism = mechanism_of(scene.linkage)
-    guide = next(joint for joint in mechanism.joints if isinstance(joint, PlanarSlide))
-    assert guide.friction is not None
-    assert guide.friction.coefficient == 0.1
-    (load,) = mechanism.loads
-    assert (load.place, load.components()) == ("slider.pin", (-50.0, 0.0))

@@ -5,7 +5,7 @@ import numpy as np
 import opened
 import pytest
 from click.testing import CliRunner
-from test_own_models import written
+from test_own_models import RANDOM, written
 from test_plugins import install
 from test_user_laws import file_with
 
@@ -63,19 +63,7 @@ class Plane(LinearRegression):
     """A plane."""
 
 
-class Anywhere:
-    """Draws at random."""
-
-    def __init__(self, task):
-        self.task = task
-
-    def ask(self):
-        low, high = self.task.bounds.T
-        return low + (high - low) * self.task.rng.random((self.task.particles, len(low)))
-
-    def tell(self, designs, objectives, constraints):
-        pass
-'''
+''' + RANDOM.replace("Random", "Anywhere")
 OFFERED = {
     "hpcclear.contact_laws": ("elastic", "Elastic"),
     "hpcclear.friction_laws": ("smooth", "Smooth"),

@@ -179,19 +179,6 @@ def test_distributions_may_lie_about_the_design() -> None:
         assert "m2" in scene.required_study.design_variables("robust")
 
 
-def test_samples_come_from_a_file_beside_the_scene(tmp_path: Path) -> None:
-    (tmp_path / "measured.csv").write_text("# calipers\npart, C [mm]\n1,0.44\n2, 0.31\n3,0.36\n")
-    text = (JOBS / "quickstart.toml").read_text()
-    row = 'C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }'
-    assert row in text
-    for column in ("C", "C [mm]"):
-        new = f'C = {{ distribution = "samples", file = "measured.csv", column = "{column}" }}'
-        (tmp_path / "scene.toml").write_text(text.replace(row, new))
-        scene = load_scene(tmp_path / "scene.toml")
-        assert scene.required_study.random_input("C").values == (3.1e-4, 3.6e-4, 4.4e-4)
-        assert load_scene(scene.resolved()) == scene
-
-
 @pytest.mark.parametrize(
     ("text", "column", "key", "reason"),
     [

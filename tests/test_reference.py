@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import integrate, kept_steps
+from running import integrate
 
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
@@ -13,7 +13,6 @@ from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.dynamics.stepping import record
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -129,19 +128,6 @@ def test_order_of_samples_does_not_change_one_bit():
     assert alone == [forward[7]]
 
 
-@pytest.mark.nightly
-def test_the_number_of_lanes_does_not_change_one_bit():
-    scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-6).with_(
-        {"numerics.energy": True, "numerics.responses": True}
-    )
-    points = random_designs(scene, 21)
-    one, *others = (evaluate_records(scene, points, lanes=lanes) for lanes in (1, 16, 32))
-    assert np.isfinite(one["energy_error"]).all()
-    for records in others:
-        for name in records.dtype.names:
-            assert records[name].tobytes() == one[name].tobytes(), name
-
-
 @pytest.mark.parametrize("budgets", [(1,), (7, 64, 1, 3)])
 def test_interruptions_do_not_change_one_bit(budgets: tuple[int, ...]):
     scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-6)
@@ -161,20 +147,6 @@ def test_interruptions_do_not_change_one_bit(budgets: tuple[int, ...]):
         return out
 
     assert outcomes(budgets).tobytes() == outcomes((1_000_000,)).tobytes()
-
-
-def test_a_small_record_changes_no_step():
-    scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-11).with_(
-        {"numerics.method": "dormand-prince"}
-    )
-    steps, _, _ = integrate(scene)
-    problem, par = problem_of(scene, energies=True, series=True), parameters(scene)
-    n = problem.coordinates
-    chunks = kept_steps(problem, par, start_states(scene, par), 50, 1_000_000)
-    rows = np.concatenate(chunks)
-    assert len(chunks) > 20
-    assert rows[:, record.STATE : record.STATE + n].tobytes() == steps.q[1:].tobytes()
-    assert rows[:, record.TIME].tobytes() == steps.time[1:].tobytes()
 
 
 def ideal_slider(scene: Scene, time: np.ndarray) -> np.ndarray:

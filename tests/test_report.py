@@ -18,7 +18,6 @@ import report_data as data
 from browser import Browser
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.session import command_line
 from hpcclear.report.html import picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
@@ -338,25 +337,6 @@ def test_the_front_is_walked_by_keyboard(browser: Browser, page: Path) -> None:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("width", [1280, 400])
-def test_every_figure_fills_the_screen_when_asked(browser: Browser, page: Path, width: int) -> None:
-    browser.open(page, width)
-    browser.run("document.querySelectorAll('details').forEach(e => { e.open = true; });")
-    size = "return document.querySelectorAll('figure')[{}].querySelector('img').getBoundingClientRect().width;"
-    for k in range(browser.run("return document.querySelectorAll('figure').length;")):
-        small = browser.run(size.format(k))
-        browser.run(f"document.querySelectorAll('figure')[{k}].querySelector('a').click();")
-        box = browser.run(
-            f"const b = document.querySelectorAll('figure')[{k}].getBoundingClientRect();"
-            " return [b.left, b.top, innerWidth - b.width, innerHeight - b.height];"
-        )
-        assert np.allclose(box, 0.0, atol=20.0)  # a scroll bar at most
-        assert browser.run(size.format(k)) > 1.5 * small
-        browser.press("Escape")
-        assert browser.run(size.format(k)) == small
-
-
-@pytest.mark.full
 def test_the_mechanism_moves_when_asked(browser: Browser, page: Path) -> None:
     browser.open(page, 1280)
     text = "return document.getElementById('motion-text').textContent;"
@@ -396,9 +376,3 @@ def test_without_scripts_the_tables_remain(browser: Browser, page: Path, tmp_pat
         assert len(notes["nodeIds"]) == 2
     finally:
         browser.command("Emulation.setScriptExecutionDisabled", value=False)
-
-
-@pytest.mark.parametrize("program", ["/a/hpcclear/__main__.py", "/venv/bin/hpcclear"])
-def test_the_command_is_told_as_one_would_type_it(monkeypatch, program: str) -> None:
-    monkeypatch.setattr(sys, "argv", [program, "run", "my engine.toml"])
-    assert command_line() == "hpcclear run 'my engine.toml'"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from running import SCENE, scene_with
+from running import scene_with
 from scipy.integrate import quad
 from test_linkage_scenes import slider_crank_pair
 
@@ -12,10 +12,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.scene import load_scene
-from hpcclear.scene.describing import effects_on
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.switches import Off, switches
 
 REST = {"kind": "torque", "torque": 5.0, "initial_speed": 0.0, "expected_speed": "1000 rpm"}
 IDEAL = {
@@ -134,17 +131,3 @@ def test_several_designs_start_alike_where_no_points_say_otherwise(drive):
     np.testing.assert_array_equal(three.rows, np.repeat(one.rows, 3, axis=0))
     # from a least-squares solution of all joints and drives
     assert one.velocities(5)[0, 4] == pytest.approx(scene.drive.initial_speed, rel=1e-14)
-
-
-def test_a_start_from_rest_is_told_before_anything_is_simulated():
-    assert "torque-driven crank, from rest" in list(effects_on(from_rest()))
-    assert "torque-driven crank" in list(effects_on(from_rest(initial_speed=40.0)))
-
-
-def test_a_drive_of_constant_speed_in_its_place_turns_as_fast_as_expected():
-    scene = load_scene(
-        SCENE, ['drive={kind="torque", torque=1.0, initial_speed=0, expected_speed=90}']
-    )
-    drive = next(one for one in switches(scene) if one.name == "speed fluctuation")
-    assert Off(scene, [drive]).scene.drive.speed == 90.0
-    assert Off(scene, [drive]).paths(("drive.expected_speed",)) == ("drive.speed",)

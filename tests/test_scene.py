@@ -15,12 +15,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from patience import crowded
-from pydantic import ValidationError
 
 from hpcclear.base import units as scene_units
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
-from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
 
 ROOT = Path(__file__).parent.parent
@@ -99,22 +97,6 @@ def test_differences_name_key_and_both_values(scene: Scene) -> None:
         "numerics.atol: (not set) -> 1e-09",
     ]
     assert differences(scene, scene) == []
-
-
-def test_nothing_can_be_changed_in_place(scene: Scene) -> None:
-    for table, name in ((scene, "drive"), (scene.mechanism.rod, "mass"), (scene.numerics, "rtol")):
-        with pytest.raises(ValidationError, match="frozen"):
-            setattr(table, name, 1.0)
-
-    def containers(value: object) -> list[object]:
-        fields = type(value).model_fields if isinstance(value, Table) else ()
-        found = [getattr(value, name) for name in fields]
-        found += list(value) if isinstance(value, tuple) else []
-        return found + [inner for item in found for inner in containers(item)]
-
-    everything = containers(load_scene(ROBUST))
-    assert len(everything) > 200
-    assert not [item for item in everything if isinstance(item, (dict, list, set))]
 
 
 def test_scene_travels_through_pickle_and_copy(scene: Scene) -> None:
@@ -446,39 +428,6 @@ def test_a_study_that_leaves_out_the_scene_itself_is_worth_a_warning() -> None:
     assert any("0.105 kg to 0.42 kg" in text and "0.55 kg" in text for text in heavy.warnings)
 
 
-def test_a_study_whose_sensitivity_nothing_reads_is_worth_a_warning() -> None:
-    linkage = load_scene(ROOT / "jobs" / "linkages" / "crank_rocker.toml")
-    assert not any("not used" in text for text in linkage.warnings)
-    gone = ("variables.coupler", "variables.mass", "surrogate.optimisation")
-    speed = {"study.variables.speed": {"path": "mechanism.drives.motor.speed", "range": [80, 95]}}
-    unknown = linkage.with_({f"study.{key}": None for key in gone} | speed)
-    assert not unknown.required_study.groups
-    assert any("study.sensitivity is not used" in text for text in unknown.warnings)
-    left_out = unknown.with_({"study.sensitivity": {"groups": []}})
-    assert not any("not used" in text for text in left_out.warnings)
-
-
-FURTHER = ("rocker.mass", "crank.mass", "rocker.length")
-
-
-@pytest.mark.parametrize(
-    ("further", "groups"),
-    [
-        (0, [("coupler", "mass")]),
-        (1, [("coupler", "mass", "x0")]),
-        (2, [("coupler", "mass"), ("x0", "x1")]),
-        (3, [("coupler", "mass"), ("x0", "x1", "x2")]),
-    ],
-)
-def test_what_a_linkage_varies_is_fitted_two_by_two(further: int, groups: list) -> None:
-    linkage = load_scene(ROOT / "jobs" / "linkages" / "crank_rocker.toml")
-    more: dict[str, object] = {
-        f"study.variables.x{k}": {"path": f"mechanism.bodies.{FURTHER[k]}", "range": [0.05, 0.2]}
-        for k in range(further)
-    }
-    assert list(linkage.with_(more).required_study.groups) == groups
-
-
 def test_schema_knows_the_word_that_switches_off() -> None:
     validator = validator_of_scenes()
     content = tomllib.loads(JOBS[0].read_text())
@@ -508,18 +457,3 @@ def test_the_accuracy_of_a_study_is_read_where_verification_had_it() -> None:
     whole["study"]["accuracy"] = asked
     with pytest.raises(InputError, match=r"stands in \[study\] already"):
         load_scene(whole)
-
-
-def test_a_kind_adds_to_what_is_checked_of_its_kind() -> None:
-    called = []
-
-    class Kind(Table):
-        def _check(self) -> None:
-            called.append("kind")
-
-    class Special(Kind):
-        def _check(self) -> None:
-            called.append("special")
-
-    Special.model_validate({})
-    assert called == ["kind", "special"]

@@ -62,6 +62,7 @@ def test_all_that_a_mechanism_has_are_signals(response):
     )  # a single place has two names
 
 
+@pytest.mark.nightly  # compared below, and one identified in test_identify
 def test_each_signal_can_be_identified_from(scene, response, table):
     names = list(signals_in(response))
     found = spectra(scene, response, names)

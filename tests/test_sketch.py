@@ -193,24 +193,6 @@ def test_check_draws_and_init_writes_what_check_accepts(tmp_path, options):
     assert file.read_bytes() == before
 
 
-def test_a_linkage_is_drawn_where_it_was_put_together():
-    """Every joint's two places coincide, and every name is there."""
-    scene = load_scene(GALLERY["linkages press"])
-    placed = Placed(scene.mechanism, poses_at_start(scene))
-    for joint in scene.mechanism.joints:
-        if joint.kind in ("revolute", "clearance"):
-            np.testing.assert_allclose(
-                placed.at(joint.journal), placed.at(joint.bearing), atol=1e-9
-            )
-    _, axes, texts = drawn(scene)
-    said = {line for text in texts for line in text.get_text().splitlines()}
-    mechanism = scene.mechanism
-    for rows in (mechanism.bodies, mechanism.joints, mechanism.drives, mechanism.loads):
-        assert {row.name for row in rows} <= said
-    assert "300 rpm" in "\n".join(said)
-    assert axes.get_aspect() == 1.0
-
-
 def test_parts_that_differ_from_another_design_are_coloured_with_their_change(tmp_path):
     changed = {"mechanism.rod.mass": 0.3, "mechanism.crank.length": 0.05}
     scene, other = engine(study=False).with_(changed), engine(study=False)

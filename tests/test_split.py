@@ -43,6 +43,7 @@ def whole(scene, tmp_path_factory) -> bytes:
     return output.read_bytes()
 
 
+@pytest.mark.nightly  # parts of any kind below
 def test_twenty_parts_of_which_three_were_killed_are_the_bytes_of_one_run(tmp_path, scene, whole):
     output = tmp_path / "samples.nc"
     killed = [Part(number, 20) for number in (3, 7, 20)]

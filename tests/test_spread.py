@@ -1,7 +1,6 @@
 """Statistics of samples: limits that hold as often as they say, and nothing stated that samples do not determine."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import opened
@@ -11,7 +10,6 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OURS
-from hpcclear.base.outcome import Flag
 from hpcclear.report import spread
 from hpcclear.report.html.page import write_report
 from hpcclear.statistics.random.survival import fewest, order_interval
@@ -129,31 +127,6 @@ def test_a_threshold_that_is_none_is_refused(words, reason):
     assert spread.beyond(spread.units_of(OURS["peak-contact-force"]), "3 kN").value == 3000.0
 
 
-def test_warnings_are_those_of_a_response_with_their_numbers_of_samples():
-    samples = drawn(60)
-    remarks = spread.remarks(samples)
-    assert len(remarks) == 2
-    assert remarks[0].startswith("20 of 60 samples: a joint stayed in contact")
-    assert remarks[1].startswith("5 of 60 samples: indentation")
-    unsure = samples.copy()
-    unsure["objective_uncertainty"] = 0.5 * samples["objective"]
-    assert "59 of 60 samples: f is sensitive" in spread.remarks(unsure)[0]
-    calm = samples.assign(flags=samples["flags"] * 0 + int(Flag.STIFF))
-    assert spread.remarks(calm) == []
-
-
-def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
-    scene = Path("jobs/quickstart.toml").read_text()
-    case = '[study.cases.rare]\nrandom = ["C"]\nobjectives = ["mean", { statistic = "exceedance", limit = "0.5 mm" }]'
-    scene = re.sub(r"\[study.cases\].*?\n\n", f"{case}\n\n", scene, flags=re.S)
-    opened.write(drawn(500, scene=scene), tmp_path / "samples.nc")
-    page = write_report(tmp_path).read_text()
-    assert "Statistics of the samples" in page
-    assert "P99 of f" in page
-    assert "f &gt; 0.5 mm" in page
-    assert "5 of 500 samples: indentation" in page
-
-
 def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_path):
     for name, failed in (("H7g6", 5), ("H7f7", 1)):
         opened.write(drawn(100, failed), tmp_path / f"{name}.nc")
@@ -174,10 +147,3 @@ def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_p
         assert len(ids) == len(set(ids))
         assert len([one for one in ids if one.startswith("figure-")]) >= 2
     assert text.count("The command that made these results") == 0  # run times were not chosen
-
-
-def test_statistics_say_of_how_many_revolutions_a_peak_is_the_largest():
-    scene = "# set: numerics.averaged_revolutions=7\n" + Path("jobs/quickstart.toml").read_text()
-    lines = spread.statistics(drawn(100, scene=scene))
-    assert text(lines, "peaks") == "largest of 7 revolutions"
-    assert "peaks" not in texts(spread.statistics(drawn(100, scene="")))

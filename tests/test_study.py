@@ -1,6 +1,5 @@
 """The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
 
-import json
 import re
 import tomllib
 from collections import Counter
@@ -16,14 +15,11 @@ from hpcclear.ensemble import single
 from hpcclear.ranks import leading
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
-from hpcclear.report.answer import answer, steps
+from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
-from hpcclear.report.merit import best_of, ours_of, recommended
-from hpcclear.report.parts import Recommended
-from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.report.merit import recommended
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.scene import load_scene
-from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import (
     chaos,
@@ -33,8 +29,7 @@ from hpcclear.study import (
 )
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.printed import printed_designs
-from hpcclear.study.paper.recognition import is_the_papers, own_names
-from hpcclear.study.problem import problem_of
+from hpcclear.study.paper.recognition import is_the_papers
 from hpcclear.study.stages import files_of
 
 Z = ("m2", "m3", "u2", "I2")
@@ -51,14 +46,10 @@ def _dynamics(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def results(carried_out):
     """One study, done in one go."""
-    place = tmp_path_factory.mktemp("study") / "whole"
-    patch = pytest.MonkeyPatch()
-    formula.replace_dynamics(patch.setattr)
     told: list[str] = []
-    run_study(scene_of(), place, alone(), progress_style="quiet", notify=told.append)
-    patch.undo()
+    place = carried_out(scene_of(), told.append)
     assert all("ended with its rounds" in text for text in told)  # there is one round
     return place
 
@@ -320,33 +311,6 @@ def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     files = {"chaos": found, "verification": verified}
     (line,) = [one for one in answer(files) if one.label == "chaos"]
     assert line.text.startswith("0 of ")
-    spoilt = found.copy(deep=True)
-    spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
-    lines = {one.label: one.text for one in answer(files | {"chaos": spoilt})}
-    assert (
-        "change 50% of the recommended design's samples and explain 40% of its variance"
-        in lines["chaos"]
-    )
-    ours = ours_of(verified)
-    advised = steps(Recommended(files | {"chaos": spoilt}, ours, best_of(ours)))
-    assert "averaged_revolutions" in " ".join(advised)
-
-
-def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):
-    place = tmp_path / "damaged"
-    with monkeypatch.context() as patch:
-        patch.setattr(Checkpoint, "finish", _interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            run_study(scene_of(), place, alone(), progress_style="quiet")
-    part = min((place / "checkpoint").glob("part-*.nc"))
-    part.write_bytes(part.read_bytes()[:-1])
-    (place / "claims.nc").unlink()
-    run_study(scene_of(), place, alone(), progress_style="quiet")
-    assert contents(place) == contents(results)
-
-
-def _interrupt(checkpoint: Checkpoint) -> None:
-    raise KeyboardInterrupt
 
 
 def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
@@ -437,15 +401,6 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
     assert float(ours["mean_lower"]) < 1.02 * least
 
 
-def test_a_surrogate_that_never_holds_is_reported(tmp_path):
-    told: list[str] = []
-    scene = scene_of("study.verification.tolerance=1e-9")
-    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", notify=told.append)
-    assert "Use the simulated values." in told[-1]
-    found = opened.read(tmp_path / "out" / "verification.nc")
-    assert told[-1] in found.attrs["remarks"]
-
-
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
@@ -457,45 +412,6 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
     scene = scene_of(*overrides, "study.surrogate.models=[['m2', 'm3']]")
     with pytest.raises(InputError, match=message):
         run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-
-
-OWN_NAMES = {
-    "m1": "crank_mass",
-    "u1": "crank_centre",
-    "I1": "crank_inertia",
-    "m2": "rod_mass",
-    "u2": "rod_centre",
-    "I2": "rod_inertia",
-    "m3": "slider_mass",
-    "C": "play",
-}
-
-
-def own_scene(*overrides: str):
-    """The same study under names of one's own."""
-    text = formula.PHYSICS + formula.STUDY
-    for short, name in OWN_NAMES.items():
-        text = re.sub(rf'"{short}"', f'"{name}"', text)
-        given = json.dumps(list(SHORT_NAMES[short]))
-        text = re.sub(rf"(?m)^{short} = {{ range", f"{name} = {{ paths = {given}, range", text)
-        text = re.sub(rf"(?m)^{short} = {{ ratio", f"{name} = {{ paths = {given}, ratio", text)
-        text = re.sub(rf"(?m)^{short} = {{ distr", f"{name} = {{ distr", text)
-    return load_scene(tomllib.loads(text), overrides)
-
-
-def test_names_decide_nothing():
-    plain, own = scene_of(), own_scene()
-    for theirs, ours in (
-        (plain.study.groups, own.study.groups),
-        (plain.study.models, own.study.models),
-    ):
-        assert [tuple(OWN_NAMES[name] for name in group) for group in theirs] == list(ours)
-    assert own.study.sensitivity.parameter == "play"
-    assert is_the_papers(own)
-    assert own_names(own) == OWN_NAMES
-    names = [choice.name for choice in printed_designs(own)]
-    assert names == [choice.name for choice in printed_designs(plain)]
-    assert printed_designs(own)[0].design["rod_inertia"] == 1.2432e-4
 
 
 @pytest.mark.parametrize(
@@ -567,45 +483,6 @@ def test_units_follow_the_objective_and_nothing_else_does(
 
 
 # -- parts ------------------------------------------------------------------------------------------
-
-
-def test_the_swarm_sees_the_exact_moments():
-    """Mean and deviation on a model of the formula equal the exact ones, I2 entering as a ratio."""
-    scene = scene_of()
-    names = scene.study.optimisation
-    from hpcclear.scene.domain import box, to_coordinates
-    from hpcclear.scene.sampling import latin_hypercube
-    from hpcclear.statistics.surrogate.fitting import fit_kriging
-    from hpcclear.statistics.surrogate.piecewise import Piecewise
-
-    widen = ("m2", "m3", "u2", "I2", "C")
-    points = latin_hypercube(scene, 250, names=names, widen=widen)
-    column = {
-        path: points.column(name) for name in names for path in scene.study.variable(name).paths
-    }
-    region = box(scene, names, widen)
-    model = fit_kriging(
-        to_coordinates(scene, names, points.values),
-        formula.objective(column),
-        np.column_stack([region.lower, region.upper]),
-        rng=np.random.default_rng(0),
-        names=("m2", "m3", "u2", "I2_ratio", "C"),
-    )
-    surrogate = Piecewise((model,), np.ones(1), np.ones(1), np.ones(1, bool))
-    design = {"m2": 0.2, "m3": 0.15, "u2": 0.05, "I2": 4e-4}
-    for case, robust in (("first", False), ("second", True)):
-        problem = problem_of(scene, case, surrogate)
-        found = problem.moments(np.array([[design[name] for name in problem.names]]))[0]
-        assert found == pytest.approx(truth(design, robust), rel=2e-4)
-    outside = problem.moments(np.array([[0.5, 0.15, 0.05, 4e-4]]))
-    assert np.isnan(outside).all()
-
-
-def test_verdicts():
-    assert claims.verdict([True, True], [False, False]) == claims.HOLDS
-    assert claims.verdict([True, False], [False, True]) == claims.FAILS
-    assert claims.verdict([True, False], [False, False]) == claims.OPEN
-    assert claims.verdict([], []) == claims.OPEN
 
 
 def test_differences_count_only_beyond_their_scatter():

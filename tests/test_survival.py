@@ -2,7 +2,6 @@
 
 import random
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +9,6 @@ from pathlib import Path
 import commands
 import kills
 import losses
-import numpy as np
-import opened
 import pytest
 from kills import COMMANDS, OPTIONS, Undisturbed, files
 from patience import crowded
@@ -81,21 +78,6 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
 
 
 @only_sample
-@pytest.mark.parametrize("program", ["hpcclear", "-m hpcclear"])
-@pytest.mark.parametrize("ranks", [0, 2])
-def test_both_entry_points_obey_a_signal(tmp_path, undisturbed, program, ranks):
-    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
-    entry = ("-m", "hpcclear") if program == "-m hpcclear" else (_script(),)
-    job = commands.start(words, ranks, entry)
-    commands.wait_for_parts(job, tmp_path)
-    commands.kill(job.pid, signal.SIGTERM)
-    code, output = commands.finish(job, 10.0)
-    assert code == 3, output
-    assert output.count("SIGTERM was received") == 1
-    assert "The same command goes on from here" in output
-
-
-@only_sample
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturbed, ranks):
     words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
@@ -115,11 +97,6 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
     assert code == 3 or ranks, output  # mpiexec aborts the job by itself, with a code of its own
     assert "Traceback" not in output
     assert commands.check_readable(tmp_path) > 0
-
-
-def _script() -> str:
-    """The installed command, next to the interpreter."""
-    return str(Path(sys.executable).parent / "hpcclear")
 
 
 # -- program errors -----------------------------------------------------------------------------
@@ -147,23 +124,6 @@ AFTER = [
     "call hpcclear.cli.printing:describe_run",
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
-STUDY_CASES = [
-    "call hpcclear.scene:load_scene",
-    "import hpcclear.study",
-    "call hpcclear.results.checkpoint:Checkpoint._open",
-    "call hpcclear.study.sensitivities:analyse",
-    "call hpcclear.study.sensitivities:_global",
-    "call hpcclear.study.surrogates:fit_all",
-    "call hpcclear.study.surrogates:_packed",
-    "call hpcclear.study.optimisation:optimise",
-    "call hpcclear.study.truth:results_of",
-    "call hpcclear.study.responses:simulate_all",
-    "call hpcclear.study.paper.readings:_over_steps",
-    "call hpcclear.study.paper.claims:judge",
-    "call hpcclear.results.checkpoint:Checkpoint.save_stage 2",
-    "call hpcclear.ensemble.session:timing_of",
-    "call hpcclear.results.checkpoint:Checkpoint.finish",
-]
 
 
 def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int) -> int:
@@ -201,24 +161,3 @@ def test_a_program_error_at_any_stage_is_reported_once_and_work_is_saved(
     # All is saved, unless each save from some moment on fails: then what came after the last good one is lost.
     assert again == 0 or case in NO_MORE_SAVES
     assert again > 0 or case not in NO_MORE_SAVES
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("undisturbed", ["run"], indirect=True)
-@pytest.mark.parametrize("case", STUDY_CASES)
-def test_a_program_error_at_any_stage_of_a_study_is_reported_once(place, undisturbed, case):
-    assert fail_and_resume(place, undisturbed, case, 0) == 0
-
-
-@only_sample
-def test_results_of_an_interrupted_run_are_datasets_of_their_own(tmp_path, undisturbed):
-    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
-    job = commands.start(words)
-    commands.wait_for_parts(job, tmp_path)
-    time.sleep(1.0)
-    commands.kill(job.pid, signal.SIGTERM)
-    assert commands.finish(job)[0] == 3
-    parts = [opened.read(path, "samples") for path in commands.result_files(tmp_path)]
-    numbers = np.concatenate([part["sample"] for part in parts])
-    assert numbers.size == np.unique(numbers).size > 100
-    assert all(np.isfinite(part["m2"]).all() for part in parts)

@@ -23,7 +23,6 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
-from hpcclear.report.bearings import sensitive_words
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -212,14 +211,6 @@ def test_wherever_the_budget_ends_limits_are_finite_or_there_are_none():
         assert found["steady_revolutions"] >= budget
 
 
-def test_a_linkage_is_looked_at_too():
-    scene = load_scene(FILE.parent / "linkages" / "crank_rocker.toml")
-    asked = {"numerics.target_error": 0.3, "numerics.target_revolutions": 100}
-    found = evaluate_records(scene.with_(asked), NOTHING)[0]
-    assert found["regime"] != Regime.UNJUDGED
-    assert found["steady_revolutions"] >= 4
-
-
 ONE_JOINT = "mechanism.joints.o3={kind='revolute',journal='coupler.b',bearing='rocker.b'}"
 """Leaves a crank-rocker one joint with clearance."""
 
@@ -241,14 +232,10 @@ def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("changes", [{"numerics.objective": "peak-contact-force"}, {"study": None}])
-def test_only_the_mean_gap_has_a_target_and_advice_for_peaks_names_revolutions(changes):
+def test_only_the_mean_gap_has_a_target(changes):
     peak = load_scene(FILE.parent / "quickstart.toml").with_(
         {"study.objective": "peak-contact-force"}
     )
     scene = BASE.with_(changes) if "study" not in changes else peak
     with pytest.raises(InputError, match=r"mean gap .*peak-contact-force.*averaged_revolutions"):
         scene.with_({"numerics.target_error": 0.01})
-    of_peak, of_gap = xr.Dataset(attrs={"objective": scene.objective.words}), xr.Dataset()
-    assert "numerics.averaged_revolutions" in sensitive_words(0.5, of_peak)
-    assert "target_error" not in sensitive_words(0.5, of_peak)
-    assert "numerics.target_error" in sensitive_words(0.5, of_gap)

@@ -6,20 +6,9 @@ from margins import at_least, at_most
 from sklearn.linear_model import LinearRegression
 
 from hpcclear.scene.stages import Sensitivity
-from hpcclear.statistics.sensitivity.intervals import (
-    IntervalSettings,
-    analyse_intervals,
-    design_intervals,
-)
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.polynomial import monomials, n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, latin_hypercube
-from hpcclear.statistics.surrogate.surface_search import (
-    SearchSettings,
-    SurfaceSearch,
-    fit_until_accepted,
-)
-from hpcclear.statistics.surrogate.term_choice import least_points
 
 DIMS = 20
 UNIT = np.tile([0.0, 1.0], (DIMS, 1))
@@ -124,26 +113,6 @@ def test_standard_errors_are_not_flattered_by_the_choice(shift: int) -> None:
         slopes, errors = surface.gradient(middle)
         off.append((slopes - (above - below) / (2 * step)) / errors)
     at_most(float(np.sqrt(np.mean(np.square(off)))), 1.5)
-
-
-def test_intervals_and_searches_choose_where_they_are_told_to() -> None:
-    bounds, settings = UNIT[:8], IntervalSettings(steps=2, n_points=60, order=3, chosen=True)
-    design = design_intervals(bounds, [1.0], np.random.default_rng(18), settings)
-
-    def function(x: np.ndarray) -> np.ndarray:
-        return x[:, 0] + 2 * x[:, 1] * x[:, 2]
-
-    history = analyse_intervals(design, function(design.points))
-    np.testing.assert_allclose(history.sensitivity[0, 0], [1, 1, 1, 0, 0, 0, 0, 0], atol=1e-8)
-    assert (history.degrees_of_freedom > 0).all()
-    values = function(design.points)
-    values[: 60 - least_points(8) + 1] = np.nan  # of the first surface one too few are left
-    assert np.isnan(analyse_intervals(design, values).sensitivity[0]).all()
-    tried = SearchSettings(orders=(3,), n_points=60, n_test=20, max_points=60, chosen=True)
-    found = SurfaceSearch(bounds, np.random.default_rng(19), tried)
-    fit_until_accepted(lambda at: {k: function(x) for k, x in at.items()}, [found])
-    assert found.accepted
-    assert len(found.best[0].coefficients) < n_terms(8, 3)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
 
-import shutil
 import tomllib
 from pathlib import Path
 
@@ -9,17 +8,13 @@ import numpy as np
 import opened
 import pytest
 import xarray as xr
-from browser import Browser, needed
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
-from hpcclear.report import beside
 from hpcclear.report.constraints import worded
 from hpcclear.report.html import designs, picture
-from hpcclear.report.html.content import Content, read
-from hpcclear.report.html.page import write_report
-from hpcclear.report.screens import screen_of
+from hpcclear.report.html.content import read
 from hpcclear.results.content import Results, each
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search.certainty import Compared
@@ -151,13 +146,6 @@ def test_each_solution_knows_all_three(study: Path) -> None:
         np.testing.assert_allclose(one, other, rtol=0.02)  # 256 points against a rule
 
 
-def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path: Path) -> None:
-    place = tmp_path / "pieces"
-    assert formula.run_in_pieces(scene_of(), str(place), alone()) >= 6
-    for name in ("front.nc", "verification.nc", "chaos.nc"):
-        assert (place / name).read_bytes() == (study / name).read_bytes(), name
-
-
 # -- cases beside each other ------------------------------------------------------------------------
 
 MIXED = (
@@ -168,6 +156,7 @@ MIXED = (
 )  # fmt: skip
 
 
+@pytest.mark.nightly  # other goals side by side are in test_goals too
 def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Path) -> None:
     place = tmp_path / "mixed"
     run_study(scene_of(*MIXED), place, alone(), progress_style="quiet")
@@ -213,19 +202,6 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
 # -- what is told -----------------------------------------------------------------------------------
 
 
-def test_the_answer_has_a_column_for_each_end(study: Path) -> None:
-    found = verified(study)
-    shown = beside.roles(found)["three"]
-    assert [role.words.removesuffix(", recommended") for role in shown][:4] == [
-        "baseline",
-        "lowest mean (alpha)",
-        "lowest std. dev. (beta)",
-        f"lowest {THIRD} (gamma)",
-    ]
-    first = screen_of(Content(study, {"verification": found}, {}))
-    assert THIRD in [tile.label for tile in first.tiles]
-
-
 def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     content = read(study)
     shown = picture.front(content)
@@ -245,40 +221,6 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
         "constraints",
     ]
     assert any(row[0] == f"lowest {THIRD} (gamma)" for row in table.rows)
-
-
-_CHOOSE = """
-const select = [...document.getElementById("front-view").closest(".controls").querySelectorAll("select")];
-select[2].value = 2;
-select[2].dispatchEvent(new Event("change"));
-return select.map((one) => [...one.options].map((option) => option.textContent));
-"""
-
-
-@needed
-@pytest.mark.nightly
-def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
-    shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
-    page = write_report(tmp_path / "page")
-    browser = Browser()
-    try:
-        browser.open(page, 1280)
-        browser.wait("document.querySelectorAll('#front .point').length > 40")
-        count = browser.run("return document.querySelectorAll('#front .point').length;")
-        before = browser.run("return document.getElementById('front').textContent;")
-        _, across, up = browser.run(_CHOOSE)
-        assert across == up == ["mean of f (mm)", "standard deviation of f (mm)", THIRD]
-        assert browser.run("return document.querySelectorAll('#front .point').length;") == count
-        after = browser.run("return document.getElementById('front').textContent;")
-        assert THIRD not in before
-        assert THIRD in after
-        assert "mean of f (mm)" in after
-        browser.open(page, 380)
-        browser.wait("document.querySelectorAll('#front .point').length > 40")
-        assert browser.run("return document.documentElement.scrollWidth;") <= 380
-        assert browser.log() == []
-    finally:
-        browser.close()
 
 
 # -- designs that are known with errors -------------------------------------------------------------

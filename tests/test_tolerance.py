@@ -182,22 +182,6 @@ def test_limits_hold_the_truth_where_designs_differ_in_what_the_tolerance_takes(
     assert np.mean(hold) > 0.95
 
 
-def test_what_was_reached_is_told(done):
-    said = " ".join(done[1])
-    assert "Largest half-widths at 95%: " in said
-    assert "(target: 0.5 % of the mean and 1 % of the standard deviation)" in said
-    assert (
-        "contributes 0.2 % of the mean and 0.2 % of the standard deviation, by pairs at rtol 1e-06"
-        in said
-    )
-    assert "dominates" not in said
-
-
-def test_a_study_that_is_stopped_after_each_stage_ends_with_the_same_bytes(done, tmp_path):
-    assert formula.run_in_pieces(scene_of(), str(tmp_path / "out"), alone()) > 4
-    assert contents(tmp_path / "out") == contents(done[0])
-
-
 @pytest.mark.mpi
 def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
     assert contents(on_ranks(scene_of(), tmp_path, BIAS)) == contents(done[0])
@@ -302,10 +286,3 @@ def test_one_number_stands_for_mean_and_deviation(entry):
     scene = scene_of(f"study.accuracy={entry}")
     assert scene.study.accuracy.mean == scene.study.accuracy.deviation == 0.01
     assert load_scene(tomllib.loads(scene.to_toml())) == scene
-
-
-def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path):
-    scene = scene_of("study.verification.samples=100")
-    told: list[str] = []
-    run_study(scene, tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
-    assert any("study.accuracy is not used" in text for text in told)

@@ -433,15 +433,6 @@ def test_change_points_that_clearance_decides_are_named_at_their_angles():
         assert changes(replace(rocking, joints=pins((pin,), *FOUR)), 0.0, 1) == ()
 
 
-def test_a_response_warns_of_change_points_that_clearance_decides():
-    folded = rocker(
-        'mechanism.ground.points.p=["120 mm", "0 mm"]', 'mechanism.bodies.rocker.length="40 mm"',
-        "mechanism.bodies.coupler.start_angle=0", 'mechanism.bodies.rocker.start_angle="25 deg"',
-    )  # fmt: skip
-    assert "0 and 180 deg of the crank" in simulate(folded).attrs["cautions"]
-    assert "cautions" not in simulate(rocker()).attrs
-
-
 def test_clearance_decides_at_a_change_point_unless_ideal_joints_alone_depend():
     base = four_bar(0.1, 0.2, 0.1, 0.2, 1.0, 1)
     opened = replace(base, joints=pins(("o3",), *FOUR))

@@ -9,7 +9,6 @@ import pytest
 from commands import overrides, run
 from running import scene_with
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.units import UnitError, noting, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.scene import load_scene
@@ -161,31 +160,6 @@ def test_turns_and_radians_are_not_guessed():
         with pytest.raises(UnitError) as error:
             to_si(f"50 {unit}", "rad/s")
         assert error.value.remedy.startswith(f"{unit} may count turns or radians")
-
-
-@pytest.mark.parametrize(("unit", "turns"), [("1/min", 1 / 60), *SOME.items(), *IN_HERTZ.items()])
-def test_a_frequency_counts_turns(unit, turns):
-    scene = load_scene(JOBS / "linkages" / "three_rrr.toml")
-    rate = 10.0 / turns  # 10 Hz in this unit
-    changed = scene.with_(
-        {
-            f"mechanism.drives.servo{k}.frequency": f"{n * rate:.17f} {unit}"
-            for k, n in enumerate((1, 2, 1))
-        }
-    )
-    for k, n in enumerate((1, 2, 1)):
-        assert changed.number(f"mechanism.drives.servo{k}.frequency") == pytest.approx(
-            10.0 * n, rel=1e-12
-        )
-    assert changed.readings == ()
-
-
-def test_a_rate_takes_no_turns():
-    """Baumgarte's feedback is neither a speed nor a frequency."""
-    assert scene_with({"numerics.alpha": "15000 min^-1"}).numerics.alpha == 250.0
-    for unit in ("Hz", "rpm", "turn/s"):
-        with pytest.raises(InputError, match="a quantity in 1/s"):
-            scene_with({"numerics.alpha": f"250 {unit}"})
 
 
 MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_speed='1200 min^-1', no_load_speed='30 turn/s'}"

@@ -131,9 +131,3 @@ def test_texts_with_files_and_fits_keep_what_was_written(tmp_path):
     assert scene_of_text(scene.text, "file") == scene
     fit = load_scene(BASE, ["joints.crank_rod.clearance=0.02 mm", "drive.speed=1470 rpm"])
     assert fit.with_({"joints.crank_rod.fit": "40 H7/f7"}).to_toml().count('"1470 rpm"') == 1
-
-
-def test_a_scene_shows_itself_in_a_line():
-    text = repr(load_scene(ROOT / "jobs" / "quickstart.toml"))
-    assert len(text) < 160
-    assert "slider-crank; 2 joints with clearance; study of m1" in text
