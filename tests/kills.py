@@ -74,27 +74,20 @@ def _of(name: str, scene: str, output: str, *words: str, options: Sequence[str] 
 
 _RANGE = ("--x", "C=0.1mm:1mm:24", "--transient", "1", "--revolutions", "2", "--bifurcation")
 _LIVES = (*overrides("wear.lives=4", "wear.cycles=1e4"), *SHORT)
+TURN = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
 _ANGULAR = overrides("wear.profile=angular", "wear.harmonics=2")
-WORN = (
-    "wear.lives=12", "wear.points=5", "wear.copies=2", "study.samples=30", "study.test_samples=8", "study.swarm.runs=1",
-    "study.swarm.particles=10", "study.swarm.iterations=5", "study.verification.infill_rounds=0",
-    "study.verification.designs=1", "study.verification.response_copies=2", "study.verification.response_windows=2",
-    "study.surrogate.restarts=0", "study.surrogate.r2=0.5", "study.surrogate.rmae=1.0",
-)  # fmt: skip
-"""A small study over clearances that lives leave."""
 _UNKNOWN = ("--unknown", "joints.crank_rod.clearance=10um:150um", "--advise", "--members", "32")
 
 COMMANDS = {
     "sample": Command(lambda folder: commands.sample(folder / "samples.nc", 4000, *OPTIONS)),
     "sample press": Command(
-        _of("sample", "linkages/press.toml", "press.nc", *overrides("study.samples=2000"), *SHORT)
+        _of("sample", "linkages/press.toml", "press.nc", *overrides("study.samples=2000", *TURN))
     ),
     "run": Command(study, interval=CHECKPOINT_INTERVAL),
     "map --bifurcation": Command(_of("map", "quickstart.toml", "b.nc", *_RANGE, *SHORT)),
     "map": Command(_of("map", "hunt_crossley.toml", "map.nc", "--x", "C=0.1mm:0.3mm:6")),
     "wear": Command(_of("wear", "wear.toml", "wear.nc", *_LIVES)),
     "wear --set angular": Command(_of("wear", "wear.toml", "wear.nc", *_LIVES, *_ANGULAR)),
-    "run worn": Command(_of("run", "worn_study.toml", "", *overrides(*WORN))),
     "effects": Command(
         _of("effects", "quickstart.toml", "e.nc", "--tolerance", "5%", "--samples", "64", *SHORT)
     ),

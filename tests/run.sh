@@ -28,7 +28,7 @@ done
 long=(
     api checkpoint cli cluster comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes
     motion native_windows notebook oracle plan progress random_scenes report robust sensitivity statistics
-    stiff study survival target tight trust vectorised
+    stiff study survival target tight trust
 )
 
 rows=()

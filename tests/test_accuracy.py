@@ -15,12 +15,7 @@ from hpcclear.accuracy.profile import QUICK
 from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
-from hpcclear.cli.printing import describe
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.figures import accuracy as accuracy_figures
-from hpcclear.report.figures import style
-from hpcclear.report.html.content import Content
-from hpcclear.report.html.costs import advice
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -256,22 +251,6 @@ def test_monte_carlo_on_the_surrogate_converges_as_theory_says(measured):
     square = (error[0] / error[2]) ** 2 / 64.0
     at_least(square, f.ppf(FALSE_RED / 2.0, 8, 8))
     at_most(square, f.isf(FALSE_RED / 2.0, 8, 8))
-
-
-def test_figures_and_tables(measured, tmp_path, capsys):
-    for name, draw in accuracy_figures.FIGURES.items():
-        assert style.save(draw(measured), tmp_path / f"{name}.png").stat().st_size > 10_000
-    describe(Content(tmp_path, {"accuracy": measured}, {}), details=True)
-    shown = capsys.readouterr().out
-    for word in (
-        "Steady mean: relative bias",
-        "of one core",
-        "tsitouras",
-        str(measured.attrs["processor"]),
-        "Your settings",
-    ):
-        assert word in shown
-    assert len(advice(measured)) == 5
 
 
 def test_without_clearance_there_is_nothing_to_measure():

@@ -17,11 +17,10 @@ from hpcclear.base.outcome import WIDEST
 from hpcclear.base.verdict import Verdict
 from hpcclear.cli.printing import LINES, describe
 from hpcclear.ranks.boundary import alone
-from hpcclear.report import alike, beside
+from hpcclear.report import alike
 from hpcclear.report.answer import answer
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.page import write_report
-from hpcclear.report.merit import recommended
 from hpcclear.report.screen import Level
 from hpcclear.report.screens import screen_of
 from hpcclear.results import dataset
@@ -222,31 +221,6 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
     for name in ("piston", "shank", "m1"):
         assert name in page
         assert name in printed
-
-
-def test_each_distinct_design_is_shown_once_by_what_it_is():
-    """The recommended one and a twin of an end have no row of their own; a lighter one does."""
-    one = data.verification()
-    shown = beside.roles(one)["robust"]
-    assert [role.design for role in shown] == [
-        f"robust {end}" for end in ("original", "alpha", "beta")
-    ]
-    best = recommended(one)
-    assert [role.words.endswith(", recommended") for role in shown] == [
-        role.design == best for role in shown
-    ]
-    at = [str(name) for name in one["design"].to_numpy()].index("robust front 1")
-    for name in ("m2", "m3"):
-        one[name][at] = 0.5 * float(one[name].min())
-    assert beside.roles(one)["robust"][-1] == ("robust front 1", "front 1, lightest")
-    alpha = [str(name) for name in one["design"].to_numpy()].index("robust alpha")
-    beta = [str(name) for name in one["design"].to_numpy()].index("robust beta")
-    for variable in data.NAMES[:4]:
-        one[variable][alpha] = float(one[variable][beta])
-    words = [role.words for role in beside.roles(one)["robust"]]
-    assert any(
-        "lowest mean (alpha)" in each and "lowest std. dev. (beta)" in each for each in words
-    )
 
 
 @pytest.mark.parametrize("seed", range(12))

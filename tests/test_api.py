@@ -6,7 +6,6 @@ from light import loaded_by
 
 import hpcclear
 import hpcclear.plugins
-from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
 
 SCENE = "jobs/slider_crank.toml"
@@ -69,14 +68,3 @@ def test_a_study_may_be_called_and_refuses_alike_on_one_process_and_on_several(t
             study(scene, tmp_path / "a")
     with pytest.raises(InputError, match="study"):
         hpcclear.run_study(scene, tmp_path / "b", ranks=2)
-
-
-def test_notebooks_show_scenes_and_plans_as_tables():
-    scene = hpcclear.load_scene("jobs/quickstart.toml")
-    shown = scene._repr_html_()
-    assert "contact law lankarani-nikravesh" in shown
-    assert scene.hash[:16] in shown
-    rows = (Row(None, scene, 2e-3, ""), Row(1e-3, scene, 4e-3, "<b>"))
-    plan = Plan(rows, 100, None, 3.0, 4e8, 5, workers=4)
-    assert "&lt;b&gt;" in plan._repr_html_()
-    assert "100 simulations on 4 ranks" in plan._repr_html_()

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.base.pieces import periodic
-from hpcclear.ensemble.samples import samples_of
-from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.points import Points, read_points
+from hpcclear.scene.points import read_points
 
 JOBS = Path(__file__).parents[1] / "jobs"
 ALL = kinds_of_tables.kinds()
@@ -232,23 +229,6 @@ def test_files_are_read_where_curves_are_only(tmp_path):
         with_file(base, "effects.slider_load", {"file": "none.csv", "bore": 1})
     with pytest.raises(InputError, match="files are read where a scene is loaded"):
         base.with_({"effects.slider_load": {"file": str(path), "bore": "42 mm", "ambient": 0}})
-
-
-def test_a_column_of_names_is_kept(tmp_path):
-    path = tmp_path / "d.csv"
-    path.write_text("design,remark,m2 [g]\nA-17,as built,210\nB-02,lighter,180\n")
-    points = read_points(path, load_scene(JOBS / "slider_crank.toml"))
-    assert points.labels == ("A-17 as built", "B-02 lighter")
-    assert points.take([1]).labels == ("B-02 lighter",)
-    assert points.names == ("m2",)
-    records = np.zeros(2, OUTCOME)
-    records["sample"] = [1, 0]  # in any order
-    content = samples_of(points.take([1, 0]), records, {})
-    netcdf.save(content, tmp_path / "s.nc")
-    back = netcdf.load(tmp_path / "s.nc").to_xarray()
-    assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
-    assert back["m2"].values.tolist() == [0.21, 0.18]
-    assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
 
 
 @pytest.mark.parametrize(

@@ -27,16 +27,13 @@ from hpcclear.ensemble.certificate import (
 )
 from hpcclear.ensemble.trial import Drawn, Trial
 from hpcclear.ranks.boundary import alone
-from hpcclear.report import effects_figure
 from hpcclear.report.figures.effects import (
-    caption,
     label,
     named,
     saving,
     seconds_of,
     statements,
 )
-from hpcclear.report.html.page import write_report
 from hpcclear.report.html.sections import _changed
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -381,19 +378,6 @@ def test_columns_drive_what_is_left_and_the_study_forgets_what_is_gone():
     assert study.variable("C").paths == ("joints.crank_rod.clearance",)
 
 
-def test_correlations_of_what_is_left_stay():
-    correlation = '{inputs=["C", "m2", "g"], matrix=[[1, 0.5, 0.2], [0.5, 1, 0.1], [0.2, 0.1, 1]]}'
-    settings = [
-        "effects.gravity=9.81", f"study.correlation={correlation}",
-        "study.random.g={path='effects.gravity', distribution='uniform', half_width=0.5}",
-    ]  # fmt: skip
-    scene = load_scene(JOBS / "quickstart.toml", settings)
-    gravity = next(one for one in switches(scene) if one.name == "gravity")
-    left = Off(scene, [gravity]).scene.study.correlation
-    assert tuple(left.inputs) == ("C", "m2")
-    np.testing.assert_array_equal(left.matrix, [[1.0, 0.5], [0.5, 1.0]])
-
-
 def test_a_linkage_has_its_effects_by_name():
     scene = load_scene(JOBS / "linkages" / "four_stroke.toml")
     found = {one.name: one for one in switches(scene)}
@@ -496,22 +480,6 @@ def test_savings_have_intervals_and_these_hold(certified, shift):
     assert drift[:2] == pytest.approx((0.4, 0.0), abs=1e-12)
     old = xr.Dataset(attrs={SECONDS_BY_ROUND: json.dumps({"all on": [4.0], name: [1.0]})})
     assert saving(content, 1, seconds_of(old)).words == "about 75 %"
-
-
-def test_figure_and_page(certified):
-    place, _ = certified
-    content, timing = (opened.read(place / name) for name in ("e.nc", "e.timing.nc"))
-    figure = effects_figure(content, timing)
-    bars = figure.axes[0].patches
-    names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
-    assert len(bars) == len(names) == 6  # five effects and the set
-    change = 100 * abs(float(content["change"][1, 0]))
-    assert bars[0].get_width() == pytest.approx(change)
-    assert effects_figure(content) is not None
-    page = write_report(place).read_text(encoding="utf-8")
-    assert "Changes with effects disabled" in page
-    assert "paired measurements with its 95 % confidence interval" in page
-    assert "run time saved, estimated from evaluations" in caption(content, None)
 
 
 def test_a_linkage_is_certified(tmp_path):

@@ -24,7 +24,6 @@ from hpcclear.base.outcome import (
     record_type,
     unknown,
 )
-from hpcclear.results import files
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
@@ -132,25 +131,6 @@ def test_a_kill_while_all_is_removed_leaves_nothing_to_go_on_from(tmp_path, monk
     assert again.load_stage("fit") is None
     discard(folder)
     assert not folder.exists()
-
-
-def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp_path, monkeypatch):
-    leftover, kept = ".hpcclear-0123456789abcdef.tmp", (".hpcclear-notes.tmp", "part.tmp")
-    for name in (leftover, *kept):
-        (tmp_path / name).touch()
-    rename, removed = os.replace, []
-
-    def rename_after_a_clean_up(source: str, target: str, **options: int) -> None:
-        if not removed:
-            removed.append(source)
-            files.remove_leftovers(tmp_path)
-        rename(source, target, **options)
-
-    monkeypatch.setattr(os, "replace", rename_after_a_clean_up)
-    files.write_bytes(tmp_path / "x", b"content")
-    assert len(removed) == 1
-    assert (tmp_path / "x").read_bytes() == b"content"
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "x"])
 
 
 # -- keys, stages, places -----------------------------------------------------------------------

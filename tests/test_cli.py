@@ -142,8 +142,6 @@ def test_a_former_name_of_a_command_is_one_and_is_not_listed(former, words):
         ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--bifurcation", "--y", "C=1:2:3"],
         ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--section", "1"],
         ["sample", "a.toml", "-o", "a.nc", "--merge", "--statistics"],
-        ["sample", "a.toml", "-o", "a.nc", "--statistics", "--points", "a.csv"],
-        ["sample", "a.toml", "-o", "a.nc", "--raw", "a"],
         ["reproduce", "a", "--crate", "--samples", "3"],
         ["init", "--import", "a.csv", "b.toml", "--jobs"],
         ["init", "a.csv", "b.toml"],
@@ -174,6 +172,11 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
         ),
         (["sample", "jobs/slider_crank.toml", "-o", "x.nc"], "study"),
         (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--time-limit", "nan"], "--time-limit"),
+        (
+            ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--statistics", "--points", "p.csv"],
+            "--points",
+        ),
+        (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--raw", "x"], "--raw"),
         (
             ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--checkpoint-interval", "nan"],
             "-interval",

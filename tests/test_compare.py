@@ -114,22 +114,6 @@ def test_the_command_prints_norms_in_the_units_of_the_measurement_and_draws(resp
     assert "kN" in panel.get_ylabel()
 
 
-def test_a_column_without_a_quantity_is_pointed_to_those_of_its_unit(response, tmp_path):
-    path = tmp_path / "m.csv"
-    path.write_text("time [s],motor [Nm]\n0,1\n1,2\n2,3\n")
-    with pytest.raises(InputError) as error:
-        compare(response, path)
-    assert "Use one of: crank_moment" in str(error.value)
-    assert "--name COLUMN=QUANTITY" in str(error.value)
-
-
-def test_a_name_of_no_column_is_refused(response, tmp_path):
-    path = measured(response, tmp_path / "m.csv", "time [ms]")
-    for name in ("Moment", "contact_force crank_rodd"):
-        with pytest.raises(InputError, match=f"the table has no column '{name}'"):
-            compare(response, path, names={name: "crank_moment"})
-
-
 @pytest.mark.parametrize("axis", ["time [ms]", "crank_angle [deg]"])
 def test_the_revolution_that_was_picked_is_told_with_the_errors_of_all(response, tmp_path, axis):
     made = response.copy(deep=True)

@@ -4,13 +4,12 @@ import functools
 import importlib.metadata
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from commands import MPIEXEC, began, finish, wait_for_parts
+from commands import MPIEXEC
 from patience import crowded
 
 import hpcclear
@@ -190,22 +189,3 @@ def test_no_command_runs_code_of_the_directory_with_a_cold_cache(theirs, results
     assert "Traceback" not in done.stderr, done.stderr
     assert done.returncode in (0, 3, 4), done.stderr
     assert not list(theirs.rglob("__pycache__"))
-
-
-@pytest.mark.nightly
-def test_a_study_on_ranks_runs_none_of_it(theirs):
-    """Started from a script, whose own directory Python leaves out with -P."""
-    program = (
-        "import hpcclear, sys\nscene = hpcclear.load_scene('quickstart.toml', sys.argv[2:])\n"
-        "hpcclear.run_study(scene, sys.argv[1], ranks=2, progress_style='log')\n"
-    )
-    words = [sys.executable, "-P", "-c", program, "study", "study.samples=16", *SHORT]
-    cache = theirs.parent / "cache"
-    cache.mkdir(mode=0o700)
-    job = began(words, theirs, HPCCLEAR_CACHE=str(cache), PYTHONPATH="")
-    try:
-        wait_for_parts(job, theirs / "study")  # both ranks have compiled and simulated
-    finally:
-        job.send_signal(signal.SIGINT)
-        finish(job)
-    assert not (theirs.parent / "ran").exists()

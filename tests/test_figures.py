@@ -282,14 +282,3 @@ def test_a_steady_response_that_starts_late_keeps_its_revolutions() -> None:
     assert motion.whole_turns(late) == 2
     assert motion.whole_turns(motion.latest(late, 5)) == 2
     np.testing.assert_allclose(motion.section(late, "slider_position"), 0.17)
-
-
-def test_drawing_leaves_a_figure_as_it_was():
-    """Who adds a title afterwards still has it laid out; drawn again, and in another size, it is the same figure."""
-    figure = report.timing_figure(data.timing())
-    engine, dots = figure.get_layout_engine(), figure.get_dpi()
-    first = style.render(figure, "png", 60)
-    assert figure.get_layout_engine() is engine
-    assert figure.get_dpi() == dots
-    assert style.render(figure, "png", 90) != first
-    assert style.render(figure, "png", 60) == first

@@ -24,8 +24,6 @@ from hpcclear.base.errors import (
     LEAST_ADDRESS_SPACE,
     LEAST_BESIDE_OTHERS,
     InputError,
-    LimitError,
-    mendable,
 )
 from hpcclear.cli import cli
 from hpcclear.ranks.stopping import StopSwitch
@@ -181,15 +179,6 @@ def test_too_few_file_handles_end_in_a_message(tmp_path):
         assert code == 1, output
         assert "ulimit -n" in output, output
         assert "Traceback" not in output
-
-
-def test_what_a_user_can_mend_is_told_from_program_errors():
-    crash = SystemError("error return without exception set")
-    crash.__context__ = MemoryError()
-    assert isinstance(mendable(crash), LimitError)
-    assert isinstance(mendable(OSError(36, "File name too long", "x")), InputError)
-    for error in (SystemError("a bug"), OSError("a bug"), ValueError(), ImportError("a bug")):
-        assert mendable(error) is None
 
 
 # -- words and rank -----------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout
 from hpcclear.identify.history import DAY, history, seconds_of
-from hpcclear.identify.inputs import Inputs, Unknown, design
+from hpcclear.identify.inputs import Inputs, design
 from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
@@ -505,11 +505,3 @@ def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
     other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
     assert other.exit_code == 2
     assert "another run" in " ".join(other.output.split())
-
-
-def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, scene):
-    with pytest.raises(InputError, match="nothing to identify"):
-        hpcclear.identify(scene, UNKNOWN)
-    with pytest.raises(InputError, match="no such signal"):
-        hpcclear.identify(scene, UNKNOWN, measured[0], of="crank_momen")
-    assert Unknown.of(scene, UNKNOWN).unit == "m"

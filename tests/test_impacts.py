@@ -257,15 +257,6 @@ def test_a_sample_has_the_levels_of_its_response(heard):
         np.testing.assert_array_equal(samples[f"{name}_limit"][0], response[f"{name}_limit"])
 
 
-def test_a_level_is_an_objective(heard):
-    scene, samples, response = heard
-    loudest = samples["contact_force_level"].isel(band=1).max("joint")
-    np.testing.assert_array_equal(samples["objective"], loudest)
-    assert float(response["objective"]) == float(samples["objective"][0])
-    assert "at 2 kHz" in scene.objective.words
-    assert samples["objective"].attrs["units"] == "1"
-
-
 def test_samples_recorded_side_by_side_are_those_recorded_alone(heard):
     scene, samples, _ = heard
     alone = evaluate(scene, {"joints.crank_rod.clearance": [6e-5]})

@@ -9,7 +9,7 @@ from kills import trial, undisturbed
 
 pytestmark = pytest.mark.mpi
 ROUNDS = {
-    "sample": 2, "sample press": 1, "run": 1, "run worn": 1, "map --bifurcation": 2, "map": 2, "wear": 2,
+    "sample": 2, "sample press": 1, "run": 1, "map --bifurcation": 2, "map": 2, "wear": 2,
     "wear --set angular": 1, "effects": 2, "identify": 2, "accuracy": 2, "accuracy --plan": 2, "init --import": 2, "export": 2,
 }  # fmt: skip
 """Times that a command is killed twice and then ends."""

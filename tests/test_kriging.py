@@ -209,14 +209,6 @@ def test_does_not_extrapolate(model):
     assert np.isfinite(model.predict(corners)).all()
 
 
-def test_constant_function():
-    points = draw(20, 6)
-    model = fit_kriging(points, np.full(20, 0.1), BOUNDS, rng=np.random.default_rng(0))
-    assert (model.predict(draw(50, 7)) == model.mean).all()
-    assert model.mean == pytest.approx(0.1, rel=1e-15)
-    assert model.variance(draw(5, 8)).max() < 1e-3
-
-
 def test_noise_is_recovered(shift):
     """Deviation 0.1 on 300 points: the estimate scatters by 0.1 / sqrt(600); 4 of that."""
     points = draw(300, 9 + shift)

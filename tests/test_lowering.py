@@ -1,8 +1,6 @@
 """Texts lowered to machine code compute what Python computes, whatever they hold; and what is interrupted is taken up again."""
 
-import ctypes
 import importlib
-import math
 import random
 import sys
 
@@ -131,13 +129,6 @@ def test_statements_do_what_they_do_in_python(function_of):
         compiled_of(n, given, theirs)
         names.update(kept)
         np.testing.assert_array_equal(mine, theirs)
-
-
-def test_a_result_of_python_is_a_number(function_of):
-    plain = function_of("def f(x):\n    return x > 1.0\n")
-    assert [
-        Compiled(plain, [Kind(DOUBLE)], (), ctypes.c_int64)(x) for x in (0.5, 1.5, math.nan)
-    ] == [0, 1, 0]
 
 
 def test_kinds_are_those_of_values():

@@ -1,8 +1,5 @@
 """No message shows how numbers are kept: NumPy's type names, or its warnings."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -54,23 +51,6 @@ def test_a_scene_changed_in_python_is_read_back_from_its_text(file):
 def test_a_note_that_is_no_value_is_refused(note):
     with pytest.raises(InputError, match="the note of a change cannot be read"):
         scene_of_text(f"# changed: {note}\n{load_scene(SCENES[0]).text}", "file")
-
-
-def test_warnings_of_numpy_are_not_for_users():
-    program = """
-import numpy as np, hpcclear.scene
-def schema(): return {"log": float(np.log(np.zeros(1))[0]), "ratio": float((np.zeros(1) / 0.0)[0])}
-hpcclear.scene.scene_schema = schema
-from hpcclear.cli import main
-main(["show", "schema"])
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert "NaN" in done.stdout
-    assert done.stderr == ""
 
 
 SLIPS = {

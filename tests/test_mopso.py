@@ -309,14 +309,6 @@ def test_same_seed_same_bits_and_other_seed_other_bits():
     assert run(zdt3, 6, 0, 20).points.tobytes() != run(zdt3, 6, 11, 20).points.tobytes()
 
 
-def test_scale_of_the_objectives_does_not_matter():
-    scale = np.array([2.0**-13, 2.0**-30])  # powers of two: exact, as small as mean and deviation
-    plain = run(zdt3, 6, 3, 40)
-    scaled = run(lambda x: zdt3(x) * scale, 6, 3, 40)
-    assert plain.points.tobytes() == scaled.points.tobytes()
-    assert plain.gain == pytest.approx(scaled.gain, abs=1e-12)
-
-
 def test_failed_points_never_enter_the_archive(shift):
     front = run(one_point_nan, 5, 1 + shift, 60)
     assert front.failed > 0

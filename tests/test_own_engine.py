@@ -1,6 +1,5 @@
 """What results say of an engine of one's own: its own numbers, its own names, the objective that was asked for."""
 
-import re
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -158,20 +157,3 @@ def test_a_peak_between_the_instants_of_the_series_has_its_angle(tmp_path, capsy
         for peak, angle in zip(response.peak_contact_force, response.peak_angle, strict=True):
             assert labels.quantity(float(peak), "N") in told
             assert f"{np.degrees(float(angle)):.0f} deg" in told
-
-
-def test_a_free_cranks_speed_and_its_drift_are_told(tmp_path, capsys):
-    """A constant torque of 5 N m on 0.2 kg m2 without load: 25 rad/s2, 0.5 rad/s a turn of 20 ms."""
-    more = (
-        'drive={ kind = "torque", torque = 5.0, flywheel_inertia = 0.2, initial_speed = "3000 rpm" }',
-        "effects.slider_load=none",
-        "numerics.averaged_revolutions=3",
-    )
-    describe_response(
-        hpcclear.simulate(engine(*more, study=False)), tmp_path / "a.nc", details=True
-    )
-    told = " ".join(capsys.readouterr().out.split())
-    found = re.search(r"crank speed 3000 rpm at the start.* revolution ([+-][\d.]+) rpm", told)
-    assert float(found[1]) == pytest.approx(0.5 * 30 / np.pi, rel=0.1)
-    describe_response(hpcclear.simulate(engine(study=False)), tmp_path / "b.nc", details=True)
-    assert "crank speed" not in capsys.readouterr().out

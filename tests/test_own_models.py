@@ -1,11 +1,14 @@
 """Surrogates and searches of a user: from a file beside the scene and from an installed package, on ranks, resumed, refused."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks
+from commands import MPIEXEC
+from formula_study import PROGRAMS, contents, formula
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
@@ -100,8 +103,9 @@ def test_quality_is_reported_and_the_file_is_read_back(results):
 @pytest.mark.mpi
 @pytest.mark.timeout(300)
 def test_two_ranks_give_the_same_bytes(results, tmp_path):
-    made = on_ranks(load_scene(results / "scene.toml"), tmp_path)
-    assert contents(made) == contents(results / "out")
+    command = [MPIEXEC, "-n", "2", sys.executable, PROGRAMS / "formula.py"]
+    subprocess.run([*command, results / "scene.toml", tmp_path / "out"], check=True, timeout=280)
+    assert contents(tmp_path / "out") == contents(results / "out")
 
 
 def test_an_edited_file_is_another_run(results, tmp_path):

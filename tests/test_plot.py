@@ -96,21 +96,6 @@ def test_a_figure_that_results_do_not_allow_is_refused_with_the_nearest(tmp_path
     assert "no response" in str(done.exception)
 
 
-def test_a_report_is_made_of_chosen_files(tmp_path):
-    opened.write(data.claims(), tmp_path / "c.nc")
-    opened.write(data.timing(), tmp_path / "t.nc")
-    opened.write(data.samples(), tmp_path / "other.nc")
-    done = run("report", tmp_path / "c.nc", tmp_path / "t.nc", "-o", tmp_path / "page.html")
-    assert done.exit_code == 0, done.exception
-    page = (tmp_path / "page.html").read_text()
-    assert "Claims of the paper" in page
-    assert "Time of the ranks" in page
-    assert "60 simulations" not in page
-    assert "Results not available" not in page
-    (tmp_path / "none.nc").write_text("nothing")
-    assert isinstance(run("report", tmp_path / "t.nc", tmp_path / "none.nc").exception, InputError)
-
-
 # -- films ------------------------------------------------------------------------------------------
 
 

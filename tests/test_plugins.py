@@ -79,11 +79,6 @@ def test_an_unknown_name_gets_the_nearest_and_all(shapes):
         shapes.get("rond")
 
 
-def test_what_a_kind_needs_is_looked_for(shapes):
-    with pytest.raises(InputError, match="has no area: a shape needs area"):
-        shapes.get("shapes:dataclass", {"shapes": SOURCE})
-
-
 def test_two_packages_that_offer_one_name_are_named(shapes, tmp_path, monkeypatch):
     for number, value in enumerate(("their_shapes:Theirs", "their_shapes:Path")):
         install(tmp_path / str(number), "hpcclear.shapes", "square", value, f"shapes-{number}")

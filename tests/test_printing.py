@@ -270,14 +270,6 @@ def test_files_of_several_designs_are_drawn_beside_each_other(tmp_path):
     assert len(force.lines) == 2
 
 
-def test_designs_of_one_dataset_are_several():
-    two = data.response(3).expand_dims(design=["old", "new"])
-    for name in data.response(3).coords:
-        two = two.assign_coords({name: data.response(3)[name]})
-    titles = [one.get_title(loc="left") for one in report.energy_figure(two).axes]
-    assert [one for one in titles if one] == ["old", "new"]
-
-
 def test_figures_take_axes_of_the_caller_and_plain_arrays():
     page = Figure()
     axes = page.subplots(2, 2)
@@ -294,19 +286,3 @@ def test_figures_take_axes_of_the_caller_and_plain_arrays():
         report.orbit_figure({name: arrays[name] for name in ("time", "penetration", "crank_angle")})
     with pytest.raises(InputError, match="has 3 panels"):
         report.poincare_figure(arrays, ax=Figure().subplots())
-
-
-def test_regimes_and_rows_of_a_table_have_colours_without_order():
-    figure = report.map_figure(cells(4, 3))
-    norms = {
-        getattr(one.norm, "Ncmap", 0): one for panel in figure.axes for one in panel.collections
-    }
-    first = [norms[5].cmap(k)[:3] for k in range(3)]
-    assert first == [pytest.approx(to_rgb(one)) for one in ("#0072b2", "#d55e00", "#009e73")]
-    chosen, names = data.samples(), ["steel", "brass", "bronze"]
-    attributes = chosen["C"].attrs | {"units": "1", "options": "; ".join(names)}
-    chosen["C"] = ("sample", np.arange(60.0) % 3, attributes)
-    drawn = report.samples_figure(chosen)
-    drawn.draw_without_rendering()
-    assert [one.get_text() for one in drawn.axes[0].get_xticklabels()] == names
-    assert len(set(map(tuple, drawn.axes[0].collections[0].get_facecolors()))) == 3

@@ -49,21 +49,6 @@ def test_a_log_gets_a_line_every_interval_with_percentage_failures_and_eta():
     ]
 
 
-def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
-    clock, log = Clock(), io.StringIO()
-    progress = Progress("", "log", 5.0, log, clock)
-    progress.start(100, records(80, failed=2))
-    clock.now += 5.0
-    progress.refresh()
-    progress.add(records(5))
-    clock.now += 5.0
-    progress.refresh()
-    assert log.getvalue().splitlines() == [
-        "80/100 (80 %), 2 failed, 0 samples/s, time left not known",
-        "85/100 (85 %), 2 failed, 0.5 samples/s, 30 s left",
-    ]
-
-
 def test_quiet_writes_nothing_and_an_empty_design_is_complete():
     log = io.StringIO()
     for style in ("quiet", "log"):

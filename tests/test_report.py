@@ -177,15 +177,6 @@ def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not (tmp_path / "report.html").exists()
 
 
-def test_the_front_has_the_simulated_designs(page: Path) -> None:
-    points = picture.front(read(page.parent))["points"]
-    names = [str(name) for name in data.verification()["design"].to_numpy()]
-    assert sorted(p["name"] for p in points) == sorted(names)
-    assert {p["kind"] for p in points} == {"design", "original", "printed"}
-    assert all(p["direct"] for p in points)
-    assert [p["x"] for p in points] == sorted(p["x"] for p in points)
-
-
 def test_the_crank_is_found_from_the_motion() -> None:
     response = data.response(2, clearance=3e-4)
     rod = np.column_stack([response["rod_x"].to_numpy(), response["rod_y"].to_numpy()])

@@ -5,11 +5,6 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
 
 from hpcclear.dynamics.layout.views import Outcome
-from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import problem_of
-from hpcclear.dynamics.setup.start import start_states
-from hpcclear.dynamics.stepping import record
-from hpcclear.dynamics.stepping.lanes import Lanes
 
 TIGHT = "prince-dormand"
 
@@ -101,19 +96,6 @@ def test_the_energy_balance_closes(name: str):
     scene = case(name, TIGHT, 1e-8)
     residual, passed = energy_residual(scene, run(scene))
     assert abs(residual) < 1e-7 * passed
-
-
-def test_a_full_record_is_not_written_beyond():
-    scene = case("dry", TIGHT, 1e-9)
-    problem, par = problem_of(scene), parameters(scene)
-    lanes = Lanes(problem, 1, np.zeros((16, record.columns(problem.coordinates))))
-    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    while not lanes.record_full:
-        assert lanes.step(1000)
-    with pytest.raises(RuntimeError, match="record is full"):
-        lanes.step(1)
-    assert len(lanes.take_record()) == 16
-    assert lanes.step(1)
 
 
 def test_a_lost_cause_ends_with_a_status():

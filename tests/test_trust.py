@@ -42,14 +42,6 @@ def test_the_stated_uncertainty_is_no_excuse(box):
         at_most(bootstrap(ratio_of_medians, stated, apart, side="lower"), 3.0)
 
 
-def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box, shift):
-    scene = load_scene(SCENE, [f"study.seed={2 + shift}"])
-    points = latin_hypercube(scene, 600).take(slice(0, 40))
-    plain = evaluate_records(scene, points)
-    np.testing.assert_array_equal(plain["objective"], box[0]["objective"][:40])
-    assert np.isnan(plain["objective_uncertainty"]).all()
-
-
 def test_well_posed_scenes_state_a_small_uncertainty(shift):
     contact = 'effects.contact={law="hunt-crossley", damping=0.5}'
     seed = f"study.seed={1 + shift}"

@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 from some_laws import row
 from test_wear import ROTOR, WEAR
 
-import hpcclear
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -243,16 +242,6 @@ def test_what_is_no_wave_is_refused(entry, key):
         scene_with({"effects.contact": HUNT_CROSSLEY, **entry})
     assert error.value.key == key
     assert error.value.remedy
-
-
-def test_more_waves_than_there_is_room_for_are_refused():
-    worn = {"bearing": {"coefficient": 1e-15}, "journal": {"coefficient": 1e-15}, "length": 0.02}
-    changes = {f"joints.{name}.wear": worn for name in WAVES}
-    scene = scene_with({**changes, "wear": {"profile": "angular", "harmonics": 5}})
-    with pytest.raises(InputError) as error:
-        hpcclear.evaluate(scene, {"m3": [0.14]})
-    assert error.value.key == "wear.harmonics"
-    assert "4 around each surface" in error.value.remedy
 
 
 # ---- lives -------------------------------------------------------------------------------------

@@ -1,12 +1,13 @@
-"""Clearances of a study that are random as wear leaves them: their distribution, refusals, the study (kills: `test_kills`)."""
+"""Clearances of a study that are random as wear leaves them: their distribution, refusals, the study over ranks and a kill."""
 
+import time
 from pathlib import Path
 
 import numpy as np
 import opened
 import pytest
-from commands import overrides, run
-from kills import WORN
+from commands import finish, kill, overrides, ranks_of, run, start
+from patience import crowded
 from scipy import stats
 
 import hpcclear
@@ -22,6 +23,12 @@ from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.study import lives
 
 SCENE = Path(__file__).parent.parent / "jobs" / "worn_study.toml"
+SMALL = (
+    "wear.lives=12", "wear.points=5", "wear.copies=2", "study.samples=30", "study.test_samples=8", "study.swarm.runs=1",
+    "study.swarm.particles=10", "study.swarm.iterations=5", "study.verification.infill_rounds=0",
+    "study.verification.designs=1", "study.verification.response_copies=2", "study.verification.response_windows=2",
+    "study.surrogate.restarts=0", "study.surrogate.r2=0.5", "study.surrogate.rmae=1.0",
+)  # fmt: skip
 
 
 # ---- a distribution that is given by its values --------------------------------------------------
@@ -131,7 +138,13 @@ def test_only_a_study_follows_lives():
 
 def words(folder: Path, *settings: str) -> list[str]:
     quiet = ["-o", str(folder), "--progress", "quiet"]
-    return ["run", str(SCENE), *quiet, *overrides(*WORN, *settings)]
+    return ["run", str(SCENE), *quiet, *overrides(*SMALL, *settings)]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Results but for the times."""
+    found = [path for path in folder.rglob("*") if path.is_file() and path.name != "timing.nc"]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +180,7 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
         f"mechanism.rod.mass={float(found.m2)!r}",
         f"mechanism.slider.mass={float(found.m3)!r}",
     )
-    words = ["wear", str(SCENE), "-o", str(tmp_path / "own.nc"), *overrides(*WORN, *masses)]
+    words = ["wear", str(SCENE), "-o", str(tmp_path / "own.nc"), *overrides(*SMALL, *masses)]
     code, output = run(words, 0)
     assert code == 0, output
     own = opened.read(tmp_path / "own.nc")
@@ -186,6 +199,31 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
         str(name) for name in others.design.values if np.isfinite(others.life_mean.sel(design=name))
     ]
     assert sorted(told) == ["worn alpha", "worn beta", "worn original"]
+
+
+@pytest.mark.nightly
+@pytest.mark.mpi
+def test_ranks_and_a_kill_among_the_lives_change_no_byte(study, tmp_path):
+    expected = files(study)
+    assert {"wear.nc", "verification.nc", "lives/worn_beta.nc"} <= expected.keys()
+    folder = tmp_path / "two"
+    code, output = run(words(folder), 2)
+    assert code == 0, output
+    assert files(folder) == expected
+    folder = tmp_path / "killed"
+    job, deadline = start(words(folder), 3), time.time() + crowded(120.0)
+    # the lives have begun; a quick machine is through before it saves any
+    while not (folder / ".wear.nc.parts").exists():
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.005)
+    time.sleep(0.5)
+    kill(ranks_of(job)[1])
+    finish(job)
+    assert not (folder / "verification.nc").exists()
+    code, output = run(words(folder), 3)
+    assert code == 0, output
+    assert files(folder) == expected
 
 
 def test_ages_that_lives_do_not_reach_are_told(tmp_path):
