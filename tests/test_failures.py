@@ -150,6 +150,3 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
     assert told["corners"] == "4 (all corners): 2 can be assembled and complete two revolutions"
     assert told["failed"].startswith(f"1 of 4 corners stalled: {Status.STALLED.message}")
     assert told["failed"].endswith(Status.STALLED.remedy)
-
-
-# -- plans in stages -------------------------------------------------------------------------------------

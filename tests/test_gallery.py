@@ -1,4 +1,4 @@
-"""The linkages of the gallery: every effect on each of them, pairwise; on-at-zero equals off; a run that was killed goes on."""
+"""The linkages of the gallery: every effect on each of them, pairwise; on-at-zero equals off."""
 
 from pathlib import Path
 

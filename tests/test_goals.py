@@ -172,9 +172,6 @@ def test_shifts_of_a_quantile_are_as_large_as_it_scatters(method: str, order: fl
         assert mean == pytest.approx(np.sqrt(order * (1 - order) / 512) / density, rel=0.15)
 
 
-# -- where to look next -----------------------------------------------------------------------------
-
-
 # -- a study ----------------------------------------------------------------------------------------
 
 SMALL = (

@@ -138,6 +138,3 @@ def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
     assert commands.run([*commands.sample(output, 100), "--fresh"], 0)[0] == 0
     assert {path: path.read_bytes() for path in before} == before
     assert (tmp_path / "samples-2.nc").exists()
-
-
-# -- the price ----------------------------------------------------------------------------------

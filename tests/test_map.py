@@ -1,4 +1,4 @@
-"""Maps: exponents, periods and kinds of motion; the same bytes for any ranks and after a kill."""
+"""Maps: exponents, periods and kinds of motion; kills are in `test_kills`."""
 
 from pathlib import Path
 

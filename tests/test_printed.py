@@ -78,9 +78,6 @@ def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
     assert not any("constant" in text or "indicative" in text for text in told)
 
 
-# -- the front on the page -----------------------------------------------------------------------------
-
-
 # -- one response --------------------------------------------------------------------------------------
 
 
