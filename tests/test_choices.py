@@ -212,25 +212,3 @@ def test_what_is_refused(case):
     error = caught.value
     assert error.key.startswith("study."), error.key
     assert words in f"{error.reason}. {error.remedy}", str(error)
-
-
-CASE = {"random": ["m3"], "objectives": ["mean"]}
-
-
-@pytest.mark.parametrize(
-    ("case", "words"),
-    [
-        ({"objectives": ["cost"]}, "no design variable of this case has a cost"),
-        ({"objectives": [{"statistic": "mean", "of": "peak-forces"}]}, "peak-forces"),
-        ({"objectives": [{"formula": "m3", "of": "peak-contact-force"}]}, "belongs to a statistic"),
-        ({"objectives": ["mean"], "constraints": [{"statistic": "quantile", "of": "peak-contact-force", "most": "3 mm"}]},
-         "does not fit"),
-    ],
-)  # fmt: skip
-def test_goals_that_are_refused(case, words):
-    spread = {"m3": {"distribution": "uniform", "half_width": 0.001}}
-    with pytest.raises(InputError) as caught:
-        scene_with({"m3": M3}, spread, {"a": {**CASE, **case}})
-    assert words in f"{caught.value.reason}. {caught.value.remedy} {caught.value.value}", str(
-        caught.value
-    )

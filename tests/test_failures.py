@@ -56,11 +56,6 @@ def test_failures_without_a_place_are_not_given_one(seed):
     assert where(failed, columns(500, 5, seed)) == "spread over the ranges of all variables"
 
 
-def test_all_that_failed_and_one_that_failed_are_told_without_a_range():
-    assert where(np.ones(50, bool), columns(50, 2, 0)) == ""
-    assert where(np.arange(50) == 3, columns(50, 2, 0)).startswith("spread")
-
-
 def failing_samples():
     """60 samples of which those with the lightest rods reached max_steps."""
     samples = data.samples(60, failed=1)

@@ -11,7 +11,6 @@ import pytest
 from test_mopso import dtlz2
 
 from hpcclear.base.errors import InputError
-from hpcclear.plugins import SEARCHES
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST
@@ -28,10 +27,6 @@ def search(name: str, function=dtlz2, seed: int = 1, bounds=UNIT, objectives: in
     rng = np.random.default_rng(seed)
     task = SearchTask(bounds, objectives, rng, 50, SwarmSettings(particles=40))
     return minimise(getattr(foreign, name)(task), function, task, 60)
-
-
-def test_the_scene_knows_all_of_them_and_no_others():
-    assert ["swarm", *(f"pymoo:{name}" for name in foreign.ALGORITHMS)] == list(SEARCHES.ours())
 
 
 @pytest.mark.parametrize("name", foreign.ALGORITHMS)

@@ -9,7 +9,7 @@ import pytest
 from running import scene_with
 
 from hpcclear.base.lowering.compiled import Compiled
-from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind, kind_of
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.stepping.lanes import Lanes
@@ -129,12 +129,6 @@ def test_statements_do_what_they_do_in_python(function_of):
         compiled_of(n, given, theirs)
         names.update(kept)
         np.testing.assert_array_equal(mine, theirs)
-
-
-def test_kinds_are_those_of_values():
-    assert kind_of((1, 2.0, None, np.zeros((2, 3)))) == kind_of((5, 0.5, None, np.ones((1, 1))))
-    assert kind_of((1,)) != kind_of((1.0,))
-    assert kind_of(np.zeros(3)) != kind_of(np.zeros(3, np.int64))
 
 
 def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):

@@ -13,8 +13,6 @@ from scipy.integrate import simpson
 
 from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import Objective
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.identity import run_key
 
 ROOT = Path(__file__).parents[1]
@@ -227,14 +225,3 @@ def test_a_rate_without_a_motion_to_be_of_is_refused(tmp_path):
     assert caught.value.key == "numerics.objective"
     of_joints = scene.with_({"numerics.objective": "mygoals:PeakForce"})
     assert (evaluate(of_joints, HEAVIER)["objective"] == 0.0).all()  # as forces of ours
-
-
-def test_a_value_that_fails_in_use_names_the_objective():
-    def fails(peak_contact_force):
-        raise KeyError("mine")
-
-    records = np.zeros(2, OUTCOME)
-    records["peak_contact_force"][0] = np.nan
-    with pytest.raises(InputError, match="its value raised KeyError: 'mine'"):
-        Objective("", "N", fails, name="mygoals:Fails").of(records)
-    assert np.isnan(Objective("", "N", fails).of(records[:1])).all()  # of a failed sample

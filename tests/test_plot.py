@@ -62,15 +62,6 @@ def cells(*shape: int) -> xr.Dataset:
 # -- by name ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
-def test_a_figure_is_drawn_by_its_name(tmp_path, ending):
-    opened.write(data.response(), tmp_path / "r.nc")
-    done = run("plot", tmp_path / "r.nc", "--figure", "orbit", "-o", tmp_path / f"o.{ending}")
-    assert done.exit_code == 0, done.output
-    signs = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
-    assert (tmp_path / f"o.{ending}").read_bytes().startswith(signs[ending])
-
-
 def test_without_an_output_the_figures_are_listed_and_with_a_directory_all_are_drawn(tmp_path):
     opened.write(data.sensitivity(), tmp_path / "sensitivity.nc")
     opened.write(data.response(), tmp_path / "r.nc")

@@ -208,14 +208,6 @@ def test_a_label_is_found_by_its_entry_and_by_its_words_and_keeps_its_unit(name)
     assert not [one for one in words if "m_2" in one]
 
 
-def test_labels_of_categories_and_legends_are_found():
-    with printing(texts={"m3": "slider", "total": "with interactions"}):
-        figure = report.sobol_figure(data.sensitivity())
-    panel = figure.axes[0]
-    assert "slider" in [one.get_text() for one in panel.get_yticklabels()]
-    assert "with interactions" in [one.get_text() for one in panel.get_legend().get_texts()]
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -11,7 +11,7 @@ from scipy import stats
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.scene.points import Points, check_points, read_points
+from hpcclear.scene.points import read_points
 from hpcclear.scene.sampling import latin_hypercube, monte_carlo
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -153,15 +153,6 @@ def test_without_a_design_variables_fill_their_range_and_inputs_scatter_about_th
     distributed_as(points.column("m2"), stats.uniform(0.205, 0.01).cdf)
     ratio = points.column("I1") / (points.column("m1") * 0.05**2 / 12)
     distributed_as(ratio, stats.uniform(1, 3).cdf)
-
-
-def test_points_that_make_no_mechanism_are_refused_by_row() -> None:
-    paths = (("joints.crank_rod.clearance",), ("joints.crank_rod.bearing_radius",))
-    points = Points(("C12", "R"), np.array([[1e-3, 0.02], [0.01, 0.01]]), paths)
-    with pytest.raises(InputError) as caught:
-        check_points(ROBUST, points)
-    assert caught.value.key.startswith("sample 1, ")
-    check_points(ROBUST, points.take([0]))
 
 
 # --- tables of designs -------------------------------------------------------------------------
