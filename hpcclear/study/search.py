@@ -162,7 +162,7 @@ class CaseSearch:
         self._failures = Failures(run, case, self._rng)
         self._near: set[int] = set()
         self._agree = [AGREE[one.statistic != "exceedance"] for one in case.kept]
-        self._seen: dict[tuple[int, int], Array] = {}
+        self._seen: dict[tuple[int, int], tuple[Array, Array]] = {}
 
     # -- asking ------------------------------------------------------------------------------------
 
@@ -258,11 +258,11 @@ class CaseSearch:
         places = to_coordinates(self._run.scene, self._names, designs)
         places = np.clip(places, *self._space.bounds.T)  # round-off at the border
         sizes = np.array([one.shape[2] for one in self.made])
-        found = np.array([self._at(row, length) for row, length in enumerate(sizes)])
+        found = np.array([self._at(row, length)[0] for row, length in enumerate(sizes)])
         off, length = np.zeros(found.shape[2]), int(sizes.max()) // 2
         while length >= sizes.min():
             longer = np.flatnonzero(sizes > length).tolist()
-            steps = [self._at(k, 2 * length)[0] - self._at(k, length)[0] for k in longer]
+            steps = [self._at(k, 2 * length)[0][0] - self._at(k, length)[0][0] for k in longer]
             known = np.isfinite(steps)
             off += np.where(known, steps, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
             found[sizes == length, 0] += off
@@ -276,15 +276,15 @@ class CaseSearch:
         )
         return Known(places, values, errors, excess, doubts)
 
-    def _at(self, row: int, length: int) -> Array:
+    def _at(self, row: int, length: int) -> tuple[Array, Array]:
         """Objectives and constraints of a design by so many points of each replicate, and standard errors, (2, k): by the same
-        points those of different designs differ by less than their errors."""
+        points those of different designs differ by less than their errors; and what replicates shift objectives, (m, replicates)."""
         if (row, length) not in self._seen:
             made, design = self.made[row][..., :length], self.choices[row].design
             values = [goals.goal_value(goal, made, design, 0.95) for goal in self._case.goals]
             pairs = [(one.value, float(spread(one.shifts[None])[0])) for one in values]
             pairs += [excess_of(goal, made, design) for goal in self._case.kept]
-            self._seen[row, length] = np.array(pairs).T
+            self._seen[row, length] = np.array(pairs).T, np.array([one.shifts for one in values])
         return self._seen[row, length]
 
     # -- probabilities -------------------------------------------------------------------------------
@@ -381,12 +381,10 @@ class CaseSearch:
             for weight, goal in zip(direction, self._case.goals, strict=True)
         ):
             return np.zeros(len(self.choices))
-        shifts = np.array([
-            direction @ [goals.goal_value(goal, made, choice.design, 0.95).shifts for goal in self._case.goals]
-            for choice, made in zip(self.choices, self.made, strict=True)
-            if made.size
-        ])  # fmt: skip
-        return np.nan_to_num(spread(shifts - shifts[row]))
+        sizes = [one.shape[2] for one in self.made if one.size]
+        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points that both have met
+        shifts = np.array([self._at(k, n)[1] - self._at(row, n)[1] for k, n in both])
+        return np.nan_to_num(spread(np.einsum("knr,n->kr", shifts, direction)))
 
     def _margins(self, aim: float, errors: Array | None = None) -> Array:
         """By how much the constraints are kept where a share of the allowed probability is taken, (constraints,); of other
