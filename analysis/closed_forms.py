@@ -38,6 +38,10 @@ PATHS = {
 DESIGN = "m2", "m3", "u2"
 SCALE = 1e-3
 
+ROUGH = {"rough": (0.02, 0.08), "wild": (0.05, 0.15)}
+CHAOS = {"chaotic": (0.02, 0.08), "wild": (0.15, 0.4)}
+"""Amplitudes of short waves, and standard deviations of what chaos adds, by kinds of forms."""
+
 WIDE = 2.0
 """Standard deviations that a judge draws with: a probability of 1e-4 to 1 or 2 % by 200 000 draws."""
 
@@ -90,7 +94,8 @@ class Form:
 
 
 def form_of(rng: np.random.Generator, kind: str) -> Form:
-    """A form that rises with masses and clearances: "smooth", "rough", "two modes" or "chaotic"."""
+    """A form that rises with masses and clearances: "smooth", "rough", "two modes", "chaotic", or "wild": both
+    rough and chaotic, as peak forces of joints are, of which no model explains more than some half."""
     slopes = rng.uniform([0.5, 0.5, -0.4, 0.4, 0.4], [1.2, 1.2, 0.4, 1.2, 1.2])
     curves = np.diag([0.0, 0.0, rng.uniform(0.8, 2.0), 0.0, 0.0]) + 0.15 * rng.standard_normal(
         (5, 5)
@@ -100,8 +105,8 @@ def form_of(rng: np.random.Generator, kind: str) -> Form:
         slopes,
         curves,
         wave,
-        rough=rng.uniform(0.02, 0.08) if kind == "rough" else 0.0,
-        chaos=rng.uniform(0.02, 0.08) if kind == "chaotic" else 0.0,
+        rough=rng.uniform(*ROUGH[kind]) if kind in ROUGH else 0.0,
+        chaos=rng.uniform(*CHAOS[kind]) if kind in CHAOS else 0.0,
         second=rng.uniform(0.6, 1.2) if kind == "two modes" else 0.0,
     )
 

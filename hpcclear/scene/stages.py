@@ -87,10 +87,11 @@ class Surrogate(Table):
     """Lowest acceptable R2 = 1 - SSE/SST on the test points."""
     rmae: Positive = 0.4
     """Largest acceptable error on the test points, divided by their standard deviation."""
-    resamplings: Annotated[int, Count(0, 20)] = 1
-    """Number of times the points are doubled before an interval is halved."""
-    cuts: Annotated[int, Count(0, 6)] = 1
-    """Number of times an interval may be halved if a model is rejected."""
+    resamplings: Annotated[int, Count(0, 20)] | None = None
+    """Number of times the points are doubled before an interval is halved; default as `cuts`."""
+    cuts: Annotated[int, Count(0, 6)] | None = None
+    """Number of times an interval may be halved if a model is rejected; default 1, but 0 for the model of the swarm
+    where a search by simulation follows, which the swarm only begins."""
     restarts: Annotated[int, Count(0, 100)] = 2
     """Number of additional starts of the search for the maximum likelihood."""
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None

@@ -12,7 +12,7 @@ WIDE = 4
 """Designs per design variable all over the box at first."""
 
 FIRST = 4
-"""Points of each replicate that a design gets at first, or half of what it may have."""
+"""Points of each replicate that a design gets at first, or a quarter of what it may have."""
 
 HEDGES = 3
 """Designs to verify that only may be the best, since what is believed of neighbours is off together."""
@@ -46,7 +46,7 @@ def simulations(study: Study) -> tuple[int, int]:
 
 def first_length(study: Study) -> int:
     """Points of each replicate that a design gets at first: a power of two."""
-    return min(max(truth.search_length(study) // 2, 2), FIRST)
+    return min(max(truth.search_length(study) // 4, 2), FIRST)
 
 
 def all_over(study: Study, case: Case) -> int:

@@ -14,8 +14,8 @@ from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
-PAIRS = 64
-"""Samples of a design that are simulated twice: the variance of pairs is known to a fifth of itself."""
+PAIRS = 32
+"""Samples of a design that are simulated twice: the variance of pairs is known to a quarter of itself."""
 
 PERTURBATION = 1e-9
 """Relative change of all variables of a sample."""

@@ -118,7 +118,8 @@ def _shown(run: StudyRun, choice: Choice, values: Array, many: int) -> float:
             freedom, left = REPLICATES - 1, min(count / settings.most_samples, 0.99)
             error = (one.upper - one.lower) / (2.0 * student(sure, freedom))
             gap = goal.most - one.value - student(last, freedom) * error * left**0.5
-            chance *= float(np.clip(ndtr(gap / (error * (1.0 - left) ** 0.5)), 1e-9, 1.0 - 1e-9))
+            shown = ndtr(gap / (error * (1.0 - left) ** 0.5)) if np.isfinite(error) else 0.5
+            chance *= float(np.clip(shown, 1e-9, 1.0 - 1e-9))
     return chance
 
 

@@ -39,9 +39,9 @@ from hpcclear.study.run import Result, StudyRun
 PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
-WORTH, PATIENCE = 0.1, 2
-"""Of the accuracy requested: what another design or more simulations are worth at least; rounds in a row that are not, after
-which the search ends."""
+WORTH, AREA, PATIENCE = 0.1, 0.005, 2
+"""What another design or more simulations are worth at least: of the accuracy requested, and of the area below the front;
+rounds in a row that are not, after which the search ends."""
 
 LEADERS, AWAY = 3, 0.05
 """Designs that get more simulations first; how far `HEDGES` are off others, over the ranges."""
@@ -195,7 +195,7 @@ class CaseSearch:
             least = WORTH * size
             row, again = self._contender(beliefs, direction, rows)
             new = worth / first_length(self._run.study)
-            worthy |= max(worth, again * self.made[row].shape[2]) > (least or WORTH / 100.0)
+            worthy |= max(worth, again * self.made[row].shape[2]) > (least or AREA)
             if again > new and again * self.made[row].shape[2] > least:
                 rows.append(row)
             elif worth > 0.0:
@@ -277,8 +277,8 @@ class CaseSearch:
         return Known(places, values, errors, excess, doubts)
 
     def _at(self, row: int, length: int) -> tuple[Array, Array]:
-        """Objectives and constraints of a design by so many points of each replicate, and standard errors, (2, k): by the same
-        points those of different designs differ by less than their errors; and what replicates shift objectives, (m, replicates)."""
+        """Objectives and constraints of a design by so many points of each replicate, and standard errors, (2, k), and what
+        replicates shift objectives, (m, replicates): by the same points designs differ by less than their errors."""
         if (row, length) not in self._seen:
             made, design = self.made[row][..., :length], self.choices[row].design
             values = [goals.goal_value(goal, made, design, 0.95) for goal in self._case.goals]
@@ -382,7 +382,9 @@ class CaseSearch:
         ):
             return np.zeros(len(self.choices))
         sizes = [one.shape[2] for one in self.made if one.size]
-        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points that both have met
+        both = [
+            (k, min(size, sizes[row])) for k, size in enumerate(sizes)
+        ]  # points that both have met
         shifts = np.array([self._at(k, n)[1] - self._at(row, n)[1] for k, n in both])
         return np.nan_to_num(spread(np.einsum("knr,n->kr", shifts, direction)))
 

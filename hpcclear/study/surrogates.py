@@ -71,6 +71,8 @@ def fit_all(run: StudyRun) -> Result:
     method = method_of(run.scene)
     for k, names in enumerate(run.study.models):
         region, settings = domain(run, names), run.study.surrogate
+        begins = tuple(names) == run.study.models[-1] and run.study.verification.infill_rounds > 0
+        more = int(not begins)  # the search by simulation is not better for a better start
         model = fit_subintervals(
             lambda points, names=names: run.simulations.values(names, points, STAGE),  # type: ignore[misc]
             np.column_stack([region.lower, region.upper]),
@@ -79,8 +81,8 @@ def fit_all(run: StudyRun) -> Result:
                 test_samples=_tests(run.study),
                 r2_min=settings.r2,
                 rmae_max=settings.rmae,
-                max_resamples=settings.resamplings,
-                max_depth=settings.cuts,
+                max_resamples=more if settings.resamplings is None else settings.resamplings,
+                max_depth=more if settings.cuts is None else settings.cuts,
             ),
             method=method,
             rng=run.rng("kriging", " ".join(names)),

@@ -25,7 +25,7 @@ from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.pooled import together
 from hpcclear.statistics.random.replicates import Estimate, moments, spread
-from hpcclear.study import truth, verdicts, verification
+from hpcclear.study import contest, goals, truth, verdicts, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -185,18 +185,33 @@ def _lengthened(
 ) -> Taken:
     """What the tolerance takes, after more and more pairs of some designs: until it is known well enough there, or all points
     are paired, or pairs have cost enough."""
-    asked = HIDDEN * np.array([run.study.wanted.mean, run.study.wanted.deviation])
     while True:
         taken = _known(run, designs, made, strict)
         spent = sum(one[0].size for one in strict)
         length = strict[rows[0]].shape[2]
         rows = [
             k for k in rows
-            if (taken.error[k, 0] > asked).any() and 2 * strict[k].shape[2] <= made[k].shape[2]
+            if 2 * strict[k].shape[2] <= made[k].shape[2]
+            and _hidden(run, designs[k], made[k], taken.error[k])
         ]  # fmt: skip
         if not rows or spent + len(rows) * REPLICATES * length > most:
             return taken
         _simulate(run, designs, strict, rows, length)
+
+
+def _hidden(run: StudyRun, choice: Choice, whole: Array, error: Array) -> bool:
+    """Whether what the tolerance takes is not known well enough yet, in what the case of a design asks for."""
+    wanted, case = run.study.wanted, run.study.case(choice.case)
+    moved = _shares(run, choice, whole, np.zeros_like(error), error)[1][3:]
+    estimates = contest.goals_of(run, choice, whole)
+    for goal, one, far in zip((*case.goals, *case.kept), estimates, moved, strict=True):
+        share, relative = goals.wanted(goal, wanted)
+        if goal.statistic == "exceedance":
+            if (error[0] > HIDDEN * np.array([wanted.mean, wanted.deviation])).any():
+                return True
+        elif not goal.exact and far > HIDDEN * share * (abs(one.value) if relative else 1.0):
+            return True
+    return False
 
 
 def _known(
@@ -287,12 +302,12 @@ def _widened(
             true[name][k] = bias[place] + np.hypot(true[name][k], far * error[place])
         count, first = len(bias) - 3, len(run.study.case(choice.case).goals)
         sure = student(verdicts.level(settings, many[k], whole[0].size), taken.freedom)
-        goals = true["goal"][k, :count]
+        found = true["goal"][k, :count]
         true["taken"][k, : count - first] = (bias + sure * error)[3 + first :]
         for name, values, part, times in (
             ("percentile", true["percentile"][k : k + 1], slice(2, 3), far),
-            ("goal", goals, slice(3, None), far),
-            ("sure", goals[first:], slice(3 + first, None), sure),
+            ("goal", found, slice(3, None), far),
+            ("sure", found[first:], slice(3 + first, None), sure),
         ):
             for end, sign in (("lower", -1.0), ("upper", 1.0)):
                 ends = true[f"{name}_{end}"][k, ...].reshape(-1)[: len(values)]
