@@ -46,14 +46,18 @@ FALL = 0.5, 1.5
 """Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f. The mean shows it
 first: the error of a standard deviation by few points falls alike whether f is rough or smooth."""
 
-SPENT, ENDS = 0.36, 2.0
-"""Part of what a search may simulate beyond its first designs; designs of a case that are simulated to the accuracy requested:
-what is recommended, and the baseline or a rival."""
+SPENT = 0.06, 0.32, 0.14
+"""Part of what a search may simulate beyond its first designs: of smooth f; more where a design takes all simulations that it
+may have; and more where it has to keep constraints."""
+
+ENDS, OTHERS = 1.2, 0.2
+"""Times the simulations that the accuracy requested takes, of the best designs in each objective and of the baseline; part of
+all other designs that there may be which are simulated."""
 
 CONTESTED = 1.5
 """Times the simulations that the accuracy of an objective takes: what designs get beyond it while they may be the best."""
 
-WEIGHED, SHOWN, NEAR = 1.4, 1.5, 6.0
+WEIGHED, SHOWN, NEAR = 2.3, 1.0, 6.0
 """Designs of a case whose rare failures are decided by weighted simulations; ones that are shown to keep another constraint, by
 all simulations that a design may have; and times `verdicts.usual`: what shows a probability near its threshold."""
 
@@ -108,28 +112,38 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         each = np.array([_of_case(run, case, lengths[0]) for case in study.cases])
     except InputError:
         return sum(samples.values()), seconds
-    found = {"search": _searched(study), "verification": 0.0}
-    looks = truth.first_length(study.verification), truth.search_length(study), truth.LOOK
-    first = min(looks) * REPLICATES
-    fixed = sum(chosen_in_all(study)) / len(study.cases)
-    for case, its in zip(study.cases, each, strict=True):
-        designs = budget.designs(study, case) if study.verification.infill_rounds else fixed
-        deciding = designs if study.verification.draws else min(ENDS, designs)
-        rares = verdicts.usual_in(case, study.verification)
-        found["verification"] += deciding * its + (designs - deciding + 1) * min(first, its)
-        found["verification"] += WEIGHED * rares
-        found["verification"] += SHOWN * max(
-            [_shown_by(one, study) for one in case.kept if not one.exact], default=0.0
-        )
-    found["verification"] += len(printed_designs(scene)) * first
+    searched, verified = np.sum(
+        [_spent(study, case, its) for case, its in zip(study.cases, each, strict=True)], axis=0
+    ).tolist()
+    verified += len(printed_designs(scene)) * _looked(study)
+    found = {"search": searched, "verification": verified}
     samples |= {name: int(extent.loads_of(scene) * count) for name, count in found.items()}
     return sum(samples.values()), here.seconds / here.count
 
 
-def _searched(study: Study) -> float:
-    """Simulations of a search, as a rule."""
-    first, further = budget.simulations(study)
-    return first + SPENT * further
+def _spent(study: Study, case: Case, its: float) -> tuple[float, float]:
+    """Simulations of the search and of the verification of a case, of which a design takes `its` for its accuracy."""
+    settings, (begun, further) = study.verification, budget.simulations(study)
+    least = truth.first_length(settings) * REPLICATES / 2
+    rough = np.log(its / least) / np.log(settings.most_samples / least)
+    part = SPENT[0] + SPENT[1] * rough + SPENT[2] * bool(case.kept)
+    designs = sum(chosen_in_all(study)) / len(study.cases)
+    if settings.infill_rounds:
+        designs = budget.designs(study, case)
+    ends = min(1 + case.plain + sum(not goal.exact for goal in case.goals), designs)
+    verified = ENDS * ends * its + OTHERS * (designs - ends + 1) * min(_looked(study), its)
+    if settings.draws:
+        verified = designs * its + _looked(study)
+    verified += WEIGHED * verdicts.usual_in(case, settings)
+    shown = [_shown_by(one, study) for one in case.kept if not one.exact]
+    verified += SHOWN * max(shown, default=0.0)
+    return (begun + min(part, 1.0) * further) / len(study.cases), verified
+
+
+def _looked(study: Study) -> float:
+    """Simulations that each verified design begins with."""
+    looks = truth.first_length(study.verification), truth.search_length(study), truth.LOOK
+    return min(looks) * REPLICATES
 
 
 def _shown_by(goal: Constraint, study: Study) -> float:
