@@ -280,8 +280,8 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
     at_most = ("search", "verification", "pairs", "chaos") if len(overrides) > 1 else ("chaos",)
-    for stage in at_most:  # rounds may win nothing, fronts be short, ends be one design
-        assert 0.5 * said[stage] < made[stage] <= said.pop(stage)
+    for stage in at_most:  # rounds may win nothing, fronts be short, ends be one design, designs that win nothing have 64
+        assert 0.2 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]
     assert dict(made) == said
     assert (
@@ -391,7 +391,8 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
     assert any(text.startswith("Surrogate errors of mean") for text in told)
     found = opened.read(tmp_path / "out" / "verification.nc")
     ours, swarms = found.sel(design="first alpha"), found.sel(design="first best alpha")
-    assert float(ours["mean_upper"]) < float(swarms["mean_lower"])
+    assert float(ours["mean_true"]) < float(swarms["mean_true"])
+    assert swarms["dominated"]  # significantly, by the scatter that both meet
     least = min(
         truth({"m2": m2, "m3": 0.07, "u2": u2, "I2": m2 * 1.2e-3}, False)[0]
         + 4e-5 * np.exp(-(((u2 - 0.12) / 0.04) ** 2))

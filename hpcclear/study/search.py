@@ -40,8 +40,8 @@ PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
 WORTH, AREA, PATIENCE = 0.1, 0.005, 2
-"""What another design or more simulations are worth at least: of the accuracy requested, and of the area below the front;
-rounds in a row that are not, after which the search ends."""
+"""What another design or more simulations are worth at least: of the accuracy requested, and of the area below a front of two
+objectives, with more a fifth of that of the distance to it; rounds in a row that are not, after which the search ends."""
 
 LEADERS, AWAY = 3, 0.05
 """Designs that get more simulations first; how far `HEDGES` are off others, over the ranges."""
@@ -154,6 +154,7 @@ class CaseSearch:
         self._most = settings.infill_rounds * settings.infill_designs
         self._batch = max(settings.infill_designs // PARTS, 1)
         self._idle, self._hope = 0, 0.0
+        self._least = AREA if len(case.goals) < 3 else AREA / 5.0
         unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
         wide = choices(run, case.name, region.lower + unit * (region.upper - region.lower))
         self.choices = distinct([*start, *wide])
@@ -195,7 +196,7 @@ class CaseSearch:
             least = WORTH * size
             row, again = self._contender(beliefs, direction, rows)
             new = worth / first_length(self._run.study)
-            worthy |= max(worth, again * self.made[row].shape[2]) > (least or AREA)
+            worthy |= max(worth, again * self.made[row].shape[2]) > (least or self._least)
             if again > new and again * self.made[row].shape[2] > least:
                 rows.append(row)
             elif worth > 0.0:
