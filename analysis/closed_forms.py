@@ -38,7 +38,7 @@ PATHS = {
 DESIGN = "m2", "m3", "u2"
 SCALE = 1e-3
 
-ROUGH = {"rough": (0.02, 0.08), "wild": (0.05, 0.15)}
+ROUGH = {"rough": (0.02, 0.08), "very rough": (0.4, 0.8), "wild": (0.05, 0.15)}
 CHAOS = {"chaotic": (0.02, 0.08), "wild": (0.15, 0.4)}
 """Amplitudes of short waves, and standard deviations of what chaos adds, by kinds of forms."""
 
@@ -94,8 +94,8 @@ class Form:
 
 
 def form_of(rng: np.random.Generator, kind: str) -> Form:
-    """A form that rises with masses and clearances: "smooth", "rough", "two modes", "chaotic", or "wild": both
-    rough and chaotic, as peak forces of joints are, of which no model explains more than some half."""
+    """A form that rises with masses and clearances: "smooth", "rough", "two modes", "chaotic", "very rough" (of a
+    model's R2 below 0.9), or "wild": rough and chaotic, as peak forces of joints are, of which no model explains much."""
     slopes = rng.uniform([0.5, 0.5, -0.4, 0.4, 0.4], [1.2, 1.2, 0.4, 1.2, 1.2])
     curves = np.diag([0.0, 0.0, rng.uniform(0.8, 2.0), 0.0, 0.0]) + 0.15 * rng.standard_normal(
         (5, 5)

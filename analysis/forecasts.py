@@ -3,15 +3,13 @@
     python analysis/forecasts.py                # ten studies, a minute on one core; writes analysis/results/forecasts.csv
     python analysis/forecasts.py --first 500 --studies 20
 
-Kinds of f (closed_forms.py, and so rough that statistics are searched in place of f), objectives, constraints, accuracies,
-numbers of designs and of rounds are drawn; a third of the studies asks for a search by statistics. Printed is the forecast
-over what is simulated.
+Kinds of f (closed_forms.py), objectives, constraints, accuracies, numbers of designs and of rounds are drawn. Printed is the
+forecast over what is simulated.
 """
 
 import argparse
 import csv
 import tempfile
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,8 +37,7 @@ ASKED: dict[str, tuple[list[Any], float | None]] = {
 }
 """Objectives, and the probability of failure that is allowed."""
 
-KINDS, VERY = ("smooth", "rough", "two modes", "chaotic", "very rough"), (0.4, 0.8)
-"""Of f, and the amplitude of the short waves of the last: of a surrogate's R2 below 0.9."""
+KINDS = "smooth", "rough", "two modes", "chaotic", "very rough"
 
 
 def main() -> None:
@@ -72,8 +69,6 @@ def study(seed: int) -> tuple[Scene, Form, str, str]:
     rng = np.random.default_rng([41, seed])
     kind = str(rng.choice(KINDS))
     form, random, asked = form_of(rng, kind), random_inputs(rng), list(ASKED)[seed % len(ASKED)]
-    if kind == "very rough":
-        form = replace(form, rough=rng.uniform(*VERY))
     objectives, most = ASKED[asked]
     case: dict[str, Any] = {"objectives": objectives}
     if most is not None:
