@@ -46,7 +46,7 @@ KINDS = {
 )
 @pytest.mark.shortened(1)
 def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
-    """Within a factor of 1.5; all of them: ``python -m pytest tests/test_forecast.py -m ""``."""
+    """Within a factor of 2, as 85 % of random studies; all of them: ``python -m pytest tests/test_forecast.py -m ""``."""
     formula.replace_dynamics(monkeypatch.setattr)
     scene = scene_of(STUDY, *KINDS[kind])
     said, seconds = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
@@ -59,8 +59,7 @@ def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
 
     monkeypatch.setattr(simulations, "sample_points", counting)
     carried_out(scene)
-    assert said == pytest.approx(sum(counted), rel=0.5), (said, sum(counted))
-    assert sum(counted) < 1.5 * said
+    assert 0.5 * said < sum(counted) < 2.0 * said
 
 
 def test_without_a_pilot_the_most_is_said():
