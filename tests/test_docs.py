@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import hooks
 import matplotlib.pyplot as plt
+import outputs
 import pytest
 import reference
 import start_page
@@ -148,6 +149,14 @@ def test_start_pages_begin_with_a_film_and_a_sentence_with_the_numbers_of_its_fi
     assert places == sorted(places)
     assert places[1] < text.index("| you want to | read |") < text.index("\n## ")
     assert start_page.FILM.stat().st_size < 600_000
+
+
+@pytest.mark.parametrize("name", ["tutorial", "how-to/effects", "how-to/identify"])
+def test_sample_outputs_are_those_that_were_recorded(name):
+    """`python analysis/outputs.py` makes them anew."""
+    page = ROOT / "docs" / f"{name}.md"
+    assert "```text from analysis/results/output_" in page.read_text(encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == outputs.filled(page)
 
 
 class Site(HTMLParser):
