@@ -8,25 +8,25 @@ start of a command, and code that is compiled already calls nothing of it. Numba
 """
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MethodType
-from typing import TypeVar
 
-from numba import config, njit
+from llvmlite import ir
+from numba import config, njit, types
 from numba.core import environment
 from numba.core.caching import Cache, IndexDataCacheFile, NullCache
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.extending import lower_builtin, register_jitable, type_callable
 
-from hpcclear.base import kept
+from hpcclear.base import bits, kept
 from hpcclear.base.code_folder import chosen_folder, source_key
+from hpcclear.base.jit import Function
 from hpcclear.base.lock import Lock
 from hpcclear.base.width import asked_width, features
-
-Function = TypeVar("Function", bound=Callable[..., object])
 
 
 @contextmanager
@@ -151,4 +151,25 @@ def cached(function: Function, **options: object) -> Function:
     return compiled  # type: ignore[no-any-return]
 
 
+def inlined(function: Function, **options: object) -> Function:
+    """Compile a function for those that call it; `options` as those of `numba.njit`."""
+    return njit(error_model="numpy", **options)(function)  # type: ignore[no-any-return]
+
+
+def _convert(function: Function, given: types.Type, made: types.Type, to: ir.Type) -> None:
+    """Tell Numba of a function that reads the bits of a number of one type as one of another."""
+
+    def lower(
+        context: object, builder: ir.IRBuilder, signature: object, values: list[ir.Value]
+    ) -> ir.Value:
+        return builder.bitcast(values[0], to)
+
+    type_callable(function)(lambda context: lambda x: made)
+    lower_builtin(function, given)(lower)
+
+
 _prepare()
+_convert(bits.bits_of, types.float64, types.int64, ir.IntType(64))
+_convert(bits.double_of, types.int64, types.float64, ir.DoubleType())
+register_jitable(bits.no_less)
+register_jitable(bits.no_more)

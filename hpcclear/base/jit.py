@@ -1,45 +1,13 @@
-"""How this package compiles: the decorators, and the width of its vectors."""
+"""How this package compiles: the decorators."""
 
-from collections.abc import Hashable, Iterator
-from contextlib import contextmanager
-
-import llvmlite.binding
-from numba import njit
-
-from hpcclear.base.cached import Function, cached, features_in_use
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from typing import TypeVar
 
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
 
-
-def doubles_in_a_vector() -> int:
-    """Numbers that a vector register of this processor holds: 8, 4 or 2."""
-    features = llvmlite.binding.get_host_cpu_features()
-    if features.get("avx512f", False):
-        return 8
-    return 4 if features.get("avx", False) else 2
-
-
-def doubles_in_use() -> int:
-    """Numbers in the vectors that the compiler uses: half of the available ones where it prefers 256 bits."""
-    half = "+prefer-256-bit" in features_in_use()
-    return min(doubles_in_a_vector(), 4 if half else 8)
-
-
-@contextmanager
-def interleaved(lanes: int) -> Iterator[None]:
-    """Have loops over so many lanes that are compiled inside taken all at once, vector by vector in one batch.
-
-    The work on one vector waits for its own roots and quotients, and the processor looks too few instructions ahead to begin
-    with the next: a force evaluation took one and a half times as long. LLVM would interleave only what needs no more
-    registers than there are. Every number is computed as it would be alone.
-    """
-    option = "-force-vector-interleave={}"
-    llvmlite.binding.set_option("", option.format(max(lanes // doubles_in_use(), 1)))
-    try:
-        yield
-    finally:
-        llvmlite.binding.set_option("", option.format(0))  # as LLVM finds best
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def narrow_vectors() -> None:
@@ -50,25 +18,47 @@ def narrow_vectors() -> None:
     """
 
 
-_written: dict[object, str] = {}
-_apart = set[object]()
+class Written:
+    """A function of the kernel, for the lowering to write out.
+
+    Where Python or a function of Numba's calls it, Numba compiles it, and is loaded for that only: a fifth of the start of a
+    command.
+
+    Attributes
+    ----------
+    py_func : callable
+        The function as it was defined.
+    kind : {"lane", "scalar"}
+        Calls are written out in functions of the same kind.
+    targetoptions : dict
+        As those of `numba.njit`.
+    apart : bool
+        See `apart`.
+    """
+
+    def __init__(self, function: Callable[..., object], kind: str, **options: object) -> None:
+        update_wrapper(self, function)
+        self.py_func, self.kind, self.targetoptions, self.apart = function, kind, options, False
+
+    @cached_property
+    def dispatcher(self) -> Callable[..., object]:
+        """The function as Numba compiles it; on disk only what Python calls one by one is kept."""
+        from hpcclear.base.cached import cached, inlined
+
+        return (inlined if self.kind == "lane" else cached)(self.py_func, **self.targetoptions)
+
+    def __call__(self, *arguments: object) -> object:
+        """Call what Numba compiled."""
+        return self.dispatcher(*arguments)
+
+    @property
+    def _numba_type_(self) -> object:
+        return self.dispatcher._numba_type_  # type: ignore[attr-defined]
 
 
-def written_kind(function: object) -> str | None:
-    """Whether calls of a function are written out, and in functions of which kind: "lane", "scalar" or None."""
-    return _written.get(function) if isinstance(function, Hashable) else None
-
-
-def lane_function(function: Function) -> Function:
+def lane_function(function: Function, fastmath: set[str] = FASTMATH) -> Function:
     """Compile what runs inside a loop over lanes: inlined, branch-free, vectorised there."""
-    compiled = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)(function)
-    _written[compiled] = "lane"
-    return compiled
-
-
-def stands_apart(function: object) -> bool:
-    """Whether it is marked by `apart`."""
-    return function in _apart
+    return Written(function, "lane", forceinline=True, fastmath=fastmath)  # type: ignore[return-value]
 
 
 def apart(compiled: Function) -> Function:
@@ -78,12 +68,10 @@ def apart(compiled: Function) -> Function:
     a function of its own is looked at whatever stands around its calls. Without this a sum may come out
     another way in one scene than in the next, in the last bit.
     """
-    _apart.add(compiled)
+    compiled.apart = True  # type: ignore[attr-defined]
     return compiled
 
 
 def scalar_function(function: Function) -> Function:
     """Compile what runs for one lane or one point at a time."""
-    compiled = cached(function)
-    _written[compiled] = "scalar"
-    return compiled
+    return Written(function, "scalar")  # type: ignore[return-value]

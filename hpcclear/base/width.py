@@ -44,3 +44,11 @@ def features() -> str | None:
         return None
     usual = 256 if llvm.get_host_cpu_name() in SLOWED else 512
     return f"{known.flatten()},{_PREFERENCE[asked or usual]}"
+
+
+def doubles_in_a_vector() -> int:
+    """Numbers that a vector register of this processor holds: 8, 4 or 2."""
+    known = llvm.get_host_cpu_features()
+    if known.get("avx512f", False):
+        return 8
+    return 4 if known.get("avx", False) else 2

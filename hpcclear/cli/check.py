@@ -11,9 +11,9 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed, place_of, show
 from hpcclear.cli.terminal import print_remark, show_rows
 from hpcclear.ranks.progress import duration
-from hpcclear.report import spread
 from hpcclear.scene import Scene
 from hpcclear.scene.plugged import files_run
+from hpcclear.scene.study_tables import DRAWN
 
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
@@ -172,7 +172,7 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     study = scene.study
     assert study is not None
     rows = [
-        ("samples", f"{study.samples} ({spread.DRAWN[study.method]}), seed {study.seed}"),
+        ("samples", f"{study.samples} ({DRAWN[study.method]}), seed {study.seed}"),
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
     if not detailed():

@@ -4,7 +4,6 @@ import numpy as np
 
 from hpcclear.cli.terminal import show_rows
 from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
-from hpcclear.report.failures import SampledVariable, sentences, where
 from hpcclear.scene import Scene
 
 
@@ -17,19 +16,29 @@ def describe(scene: Scene, simulate: bool) -> None:
 def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     """Return label and text of each line."""
     points, total = found.points, len(found.points)
+    bad = len(found.refused) + int((found.status > 0).sum())
+    does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
+    which = (
+        "all corners" if total < MOST or total == 2 ** len(points.names) else "a balanced selection"
+    )
+    rows = [("corners", f"{total} ({which}): {total - bad} {does}")]
+    if not bad:
+        return rows
+    from hpcclear.report.failures import (  # load what reads results
+        SampledVariable,
+        sentences,
+        where,
+    )
+
     columns = [
         SampledVariable(name, unit or "1", values)
         for name, unit, values in zip(points.names, points.units, points.values.T, strict=True)
     ]
-    failed = list(sentences(found.status, columns, "corners")) if simulate else []
-    bad = len(found.refused) + int((found.status > 0).sum())
-    does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
-    which = "all corners" if total < MOST or total == 2 ** len(columns) else "a balanced selection"
-    rows = [("corners", f"{total} ({which}): {total - bad} {does}")]
     for reason in dict.fromkeys(found.refused.values()):
         hit = np.array([found.refused.get(row) == reason for row in range(total)])
         place = where(hit, columns)
         rows.append(
             ("refused", f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}")
         )
+    failed = sentences(found.status, columns, "corners") if simulate else ()
     return rows + [("failed", text) for text in failed]

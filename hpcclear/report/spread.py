@@ -20,18 +20,11 @@ from hpcclear.report.figures import labels
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import scene_of_text
+from hpcclear.scene.study_tables import DRAWN
 from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
 
 LEVELS = (0.5, 0.95, 0.99)
 """Probabilities of the quantiles that are stated."""
-
-DRAWN = {
-    "lhs": "Latin hypercube over the ranges of the study variables",
-    "monte-carlo": "independent samples of the random inputs",
-    "random-lhs": "Latin hypercube of the random inputs",
-    "qmc": "Sobol sequence of the random inputs",
-}
-"""Sampling in words, by method (attribute ``sampling``)."""
 
 INDEPENDENT = "computed for independent samples"
 USUALLY_WIDER = (

@@ -41,6 +41,14 @@ def claim(owner: dict[str, str], path: str, name: str, key: str) -> None:
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
 _LINK_NUMBERS = ("mass", "mass_center", "inertia")
 
+DRAWN = {
+    "lhs": "Latin hypercube over the ranges of the study variables",
+    "monte-carlo": "independent samples of the random inputs",
+    "random-lhs": "Latin hypercube of the random inputs",
+    "qmc": "Sobol sequence of the random inputs",
+}
+"""Sampling in words, by method (attribute ``sampling``)."""
+
 
 class StudyTables(Table):
     """The entries of the table of a study, each valid by itself."""

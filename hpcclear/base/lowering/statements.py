@@ -14,7 +14,6 @@ from functools import cache
 import numpy as np
 from llvmlite import ir
 
-from hpcclear.base.jit import stands_apart, written_kind
 from hpcclear.base.lowering.expressions import Expressions
 from hpcclear.base.lowering.values import (
     DOUBLE,
@@ -77,7 +76,7 @@ class Function(Expressions):
     def __init__(
         self, function: Value, kinds: Sequence[Kind], name: str, flags: Flags, call: Value
     ) -> None:
-        self.kind = written_kind(function) or "lane"
+        self.kind = getattr(function, "kind", "lane")
         self.lowers, self.kinds = function, kinds
         self.name, self._call = name, call
         self.types: dict[tuple[int, str], ir.Type] = {}  # of locals that are numbers, by call
@@ -155,7 +154,7 @@ class Function(Expressions):
         defaults = plain.__defaults__ or ()
         given = dict(zip(names[len(names) - len(defaults) :], defaults, strict=True)) | given
         values = {name: given[name] for name in names}
-        inside = written_kind(function) == self.kind and not stands_apart(function)
+        inside = getattr(function, "kind", None) == self.kind and not function.apart
         if inside and not _returns_inside_a_loop(function):
             return self.inlined(function, values)
         return self.beside(function, list(values.values()))

@@ -3,9 +3,9 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
 
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.bits import carray
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 

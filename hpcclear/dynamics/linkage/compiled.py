@@ -14,9 +14,8 @@ from hpcclear.dynamics.linkage.generator import Motion
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
 import numpy as np
-from numba import carray
 
-from hpcclear.base.bits import beyond
+from hpcclear.base.bits import beyond, carray
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
 {geometries}from hpcclear.dynamics.linkage.elements import {elements}

@@ -8,8 +8,8 @@ from functools import cache
 from types import ModuleType
 
 from hpcclear.base.bits import call_at
-from hpcclear.base.jit import FASTMATH, interleaved, lane_function
-from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.lowering.compiled import Compiled, interleaved
 from hpcclear.base.lowering.values import DOUBLES
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.compiled import BANK

@@ -1,11 +1,10 @@
 """Sine and cosine by polynomial, since a library call keeps the compiler from vectorising the lanes."""
 
 import math
-
-from numba import njit
+from functools import partial
 
 from hpcclear.base.bits import bits_of, double_of
-from hpcclear.base.jit import lane_function
+from hpcclear.base.jit import apart, lane_function
 
 # pi/2 in two parts: the first has zeros in its last bits, so that k * _HALF_PI_HIGH is exact for moderate k
 _HALF_PI_HIGH = 1.5707963267341256
@@ -21,7 +20,8 @@ def with_sign(number, turn):
 
 
 # Neither "reassoc" nor "arcp" here: the two-part reduction relies on the order of the operations.
-@njit(forceinline=True, error_model="numpy", fastmath={"contract"})
+@apart
+@partial(lane_function, fastmath={"contract"})
 def sincos(angle):
     """Sine and cosine of an angle in rad, within 2e-16 absolute for |angle| < 1e4.
 

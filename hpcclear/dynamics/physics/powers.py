@@ -2,7 +2,8 @@
 
 import math
 
-from hpcclear.base.bits import bits_of, double_of, falling, no_less
+from hpcclear.base.bits import bits_of, double_of, no_less
+from hpcclear.base.exponentials import falling
 from hpcclear.base.jit import lane_function
 
 

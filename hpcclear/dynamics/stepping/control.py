@@ -5,11 +5,11 @@ and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair avai
 """
 
 import math
+from functools import partial
 
-from numba import njit
-
-from hpcclear.base.bits import no_less, rough_exp2, rough_log2
-from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.bits import no_less
+from hpcclear.base.exponentials import rough_exp2, rough_log2
+from hpcclear.base.jit import FASTMATH, apart, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import RunSettings
 
@@ -24,7 +24,8 @@ FIRST_PART = 0.1
 """Depth at the start of a step over that at its end below which it is a contact's first step."""
 
 
-@njit(forceinline=True, error_model="numpy", fastmath=FASTMATH | {"reassoc"})
+@apart
+@partial(lane_function, fastmath=FASTMATH | {"reassoc"})
 def count_up(count, flag):
     """count + flag, a sum of zeros and ones: exact in any order, so the compiler may reorder it."""
     return count + flag

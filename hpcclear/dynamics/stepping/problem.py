@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.outcome import Status
 from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
@@ -15,9 +15,11 @@ from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.layout.views import Outcome, Parameters, RunSettings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
-from hpcclear.dynamics.linkage.rhs import compiled_motion
 from hpcclear.dynamics.stepping.explicit.tableau import Tableau
 from hpcclear.dynamics.stepping.sample import STRICT
+
+if TYPE_CHECKING:
+    from hpcclear.base.lowering.compiled import Compiled
 
 TORN = 0.25
 """Penetration over a bearing's radius from which on a result is none: contact laws are of small ones, the softest bearing
@@ -113,8 +115,10 @@ class Problem:
         ]
         return np.array([0.0] * at.bristles_of(self.effects) + gained)
 
-    def motion(self, effects: at.Effects, width: int) -> Compiled:
+    def motion(self, effects: at.Effects, width: int) -> "Compiled":
         """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""
+        from hpcclear.dynamics.linkage.rhs import compiled_motion  # loads the compiler
+
         return compiled_motion(self.linkage.module(effects), effects, width)
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:

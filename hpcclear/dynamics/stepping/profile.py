@@ -10,8 +10,7 @@ It is compiled for the joints and waves there are, and steppers call it by its a
 import math
 from functools import cache
 
-from numba import carray
-
+from hpcclear.base.bits import carray
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import DOUBLES

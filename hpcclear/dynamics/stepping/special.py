@@ -5,9 +5,7 @@ One function for all steppers: it is compiled once, for any number of lanes, coo
 
 from functools import cache
 
-from numba import carray
-
-from hpcclear.base.bits import call_at
+from hpcclear.base.bits import call_at, carray
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES

@@ -2,7 +2,7 @@
 
 Everything runs along the training points, the one long dimension, so that a design's result does
 not depend on which other designs are in the batch. Numba has no vectorised exponential of its own;
-the polynomial one of `hpcclear.base.bits` lets LLVM keep these loops in vector registers.
+the polynomial one of `hpcclear.base.exponentials` lets LLVM keep these loops in vector registers.
 """
 
 from functools import partial
@@ -10,8 +10,8 @@ from functools import partial
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.bits import falling
 from hpcclear.base.cached import cached
+from hpcclear.base.exponentials import falling
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""

@@ -2,9 +2,7 @@
 
 from functools import cache
 
-from numba import carray
-
-from hpcclear.base.bits import beyond
+from hpcclear.base.bits import beyond, carray
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES

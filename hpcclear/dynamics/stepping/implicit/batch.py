@@ -7,9 +7,7 @@ step would. A sample keeps its column of the eight for as long as it is stiff, a
 
 from functools import cache
 
-from numba import carray
-
-from hpcclear.base.bits import call_at
+from hpcclear.base.bits import call_at, carray
 from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled

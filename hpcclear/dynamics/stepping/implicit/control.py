@@ -5,7 +5,7 @@ Its numbers stand in column i of the rows that `memory` names.
 
 import math
 
-from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.exponentials import rough_exp2, rough_log2
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import RunSettings
