@@ -165,16 +165,21 @@ def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array
     """The path in contact, along the bore from instant to instant and never across it; single instants are dots."""
     rolls, turned = _rolls(angle, contact), _turned(angle)
     alone = contact & ~np.append(rolls, False) & ~np.insert(rolls, 0, False)
-    pieces = [np.full((1, 2), np.nan)]
-    for k in np.flatnonzero(np.append(rolls, False) | alone):
-        ahead = int(not alone[k])
-        part = np.linspace(0.0, ahead, 2 + int(abs(turned[k] if ahead else 0.0) / _STEP))
-        r = radius[k] + part * (radius[k + ahead] - radius[k])
-        phi = angle[k] + part * (turned[k] if ahead else 0.0)
-        gap = [] if ahead and rolls[k + 1 : k + 2].any() else [[np.nan, np.nan]]
-        pieces += [np.column_stack([r * np.cos(phi), r * np.sin(phi)]), *map(np.atleast_2d, gap)]
-    path = np.concatenate(pieces)
-    return path[:, 0], path[:, 1]
+    begin = np.flatnonzero(np.append(rolls, False) | alone)
+    ahead = np.where(alone[begin], 0, 1)
+    turn = np.append(turned, 0.0)[begin] * ahead
+    points = 2 + (np.abs(turn) / _STEP).astype(int)
+    ends = ~(np.append(rolls, [False, False])[begin + 1] & (ahead > 0))  # with a gap behind it
+    piece = np.repeat(np.arange(len(begin)), points + ends)
+    place = np.arange(len(piece)) - np.repeat(
+        np.cumsum(points + ends) - points - ends, points + ends
+    )
+    k, last = begin[piece], points[piece] - 1
+    part = np.where(place < last, place * (ahead[piece] / last), ahead[piece])
+    r = radius[k] + part * (radius[k + ahead[piece]] - radius[k])
+    r[place > last] = np.nan
+    phi = angle[k] + part * turn[piece]
+    return np.insert(r * np.cos(phi), 0, np.nan), np.insert(r * np.sin(phi), 0, np.nan)
 
 
 def _circle(axes: "style.Axes", radius: float) -> None:

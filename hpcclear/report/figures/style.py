@@ -301,7 +301,8 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     """
     buffer, user = io.BytesIO(), _users.get(figure, Printing())
     engine, dots = figure.get_layout_engine(), figure.get_dpi()
-    with matplotlib().rc_context({**RC, **user.rc, "backend": "agg"}):
+    none = {"backend": "agg", "figure.autolayout": False, "figure.constrained_layout.use": False}
+    with matplotlib().rc_context({**RC, **user.rc, **none}):
         try:
             figure.set_dpi(dpi)
             if engine is not None:  # here, as matplotlib would draw all of it once more for it
@@ -309,7 +310,9 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
                     engine.check(figure)
                 else:
                     engine.execute(figure)
-                figure.set_layout_engine("none")
+                figure.set_layout_engine(
+                    None
+                )  # with one all would be drawn once more
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_STAMPS[kind][1])
         finally:
             if engine is not None:
