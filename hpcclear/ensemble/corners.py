@@ -68,11 +68,12 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     ]
     locked = dict[bytes, str]()  # by what decides whether a design can turn: most corners share it
     refused = dict[int, str]()
+    doubted = bool(_refusal(plain, points))
     for row, values in enumerate(points.values):
         corner, geometry = points.take(slice(row, row + 1)), values[moving].tobytes()
-        why = _refusal(plain, corner)
+        why = _refusal(plain, corner) if doubted else ""
         if not why and geometry not in locked:
-            locked[geometry] = _obstacle(plain, corner)
+            locked[geometry] = _obstacle(scene_of(plain, corner, 0) if geometry else scene)
         if why := why or locked[geometry]:
             refused[row] = why
     status = np.full(len(points), -1)
@@ -89,21 +90,20 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     return CornerOutcomes(points, refused, status)
 
 
-def _refusal(scene: Scene, corner: Points) -> str:
-    """Why the numbers of one corner (1 row) make no mechanism; "" if they do."""
+def _refusal(scene: Scene, points: Points) -> str:
+    """Why the numbers of the first corner that makes no mechanism make none; "" if all do."""
     try:
-        check_points(scene, corner)
+        check_points(scene, points)
     except InputError as error:
         return f"{error.reason}. {error.remedy}"
     return ""
 
 
-def _obstacle(scene: Scene, corner: Points) -> str:
-    """Why the mechanism of one corner does not close or cannot turn; "" if it can."""
+def _obstacle(scene: Scene) -> str:
+    """Why the mechanism of a scene does not close or cannot turn; "" if it can."""
     try:
-        one = scene_of(scene, corner, 0)
-        poses_at_start(one)  # refuses one that does not close
-        locked = refused_of(one)
+        poses_at_start(scene)  # refuses one that does not close
+        locked = refused_of(scene)
     except InputError as error:
         return f"{error.reason}. {error.remedy}"
     return "" if locked is None else f"{locked[0].message}. {locked[0].remedy}"

@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.parts import GROUND, Number, split
 from hpcclear.dynamics.linkage.rows import On
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
-from hpcclear.dynamics.planar.turning import changes, refused
+from hpcclear.dynamics.planar.turning import Walk, changes, passage, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import PlanarSlide, turns_of
 from hpcclear.scene.points import Numbers, Points
@@ -251,7 +251,12 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
     InputError
         If it cannot be put together.
     """
-    return refused(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
+    return refused(_walk_of(scene))
+
+
+@lru_cache(maxsize=2)
+def _walk_of(scene: Scene) -> Walk | None:
+    return passage(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
 
 
 @lru_cache(maxsize=64)
@@ -260,9 +265,7 @@ def cautions_of(scene: Scene) -> tuple[str, ...]:
     if refused_of(scene) is not None:
         return ()
     mechanism = mechanism_of(scene.linkage)
-    at_angles = [
-        f"{angle:.0f}" for angle in changes(mechanism, scene.effects.gravity, rounds_of(scene))
-    ]
+    at_angles = [f"{angle:.0f}" for angle in changes(mechanism, _walk_of(scene))]
     if not at_angles:
         return ()
     return (

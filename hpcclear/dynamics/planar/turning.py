@@ -80,7 +80,11 @@ def twin_of(mechanism: Mechanism) -> Mechanism | None:
     return None if freedom(twin) else twin
 
 
-def passage(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Assembly, Passage] | None:
+Walk = tuple[Assembly, Passage]
+"""Of a linkage put together, through its revolutions."""
+
+
+def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:
     """The walk of a linkage's twin through so many revolutions, put together; None where it is not to be judged.
 
     Raises
@@ -151,9 +155,8 @@ def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: Wa
     return bool(np.linalg.svd(jacobian)[1][-1] < DEPENDENT)
 
 
-def refused(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Status, InputError] | None:
-    """The status of a linkage that cannot turn, and what to say; None for one that can, or is not to be judged."""
-    found = passage(mechanism, gravity, rounds)
+def refused(found: Walk | None) -> tuple[Status, InputError] | None:
+    """The status of a linkage that cannot turn, by its `passage`, and what to say; None for one that can, or is not judged."""
     if found is None or found[1].ended is None:
         return None
     error = refusal(*found)
@@ -161,11 +164,10 @@ def refused(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Status, 
     return found[1].ended.status, InputError(key, error.value, error.reason, error.remedy)
 
 
-def changes(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[float, ...]:
+def changes(mechanism: Mechanism, found: Walk | None) -> tuple[float, ...]:
     """Angles, deg, of the body that defines the period where clearance decides which way a linkage goes on: change points of
-    its twin. Empty for a linkage without clearance, whose change points are passed or refused."""
-    found = passage(mechanism, gravity, rounds) if mechanism.clearances else None
-    if found is None or found[1].ended is not None:
+    its twin, by its `passage`. Empty for a linkage without clearance, whose change points are passed or refused."""
+    if not mechanism.clearances or found is None or found[1].ended is not None:
         return ()
     assembly, walk = found
     return tuple(sorted(angle_of(pose_at(assembly, walk, node)) for node in walk.changes))

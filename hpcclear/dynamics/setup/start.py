@@ -27,7 +27,7 @@ from hpcclear.dynamics.planar.problem import (
     scene_of,
 )
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.planar.turning import loops_of, pinned, refused
+from hpcclear.dynamics.planar.turning import loops_of, passage, pinned, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -129,7 +129,7 @@ def _statuses(loops: Loops | None, samples: Samples, gravity: float, rounds: int
         return found
     for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
         try:
-            refusal = refused(samples.mechanism(row), gravity, rounds)
+            refusal = refused(passage(samples.mechanism(row), gravity, rounds))
         except InputError:
             refusal = None
         found[row] = int(Status.OK if refusal is None else refusal[0])
