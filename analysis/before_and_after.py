@@ -1,17 +1,21 @@
-"""Is this checkout slower than an earlier commit? Ensembles of several scenes, both sources in turn, ratios pair by pair.
+"""Is this checkout slower than an earlier commit? Ensembles of several scenes, or the starts of commands; both sources in turn,
+ratios pair by pair.
 
     python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about ten minutes
     python analysis/before_and_after.py 1386e2f --pairs 15 --designs 512
     python analysis/before_and_after.py 1386e2f --record        # writes results/before_and_after.csv beside this file
+    python analysis/before_and_after.py 063ea1e --starts        # commands that compute little, two minutes; results/starts.csv
 
-Each source has one process, which compiles first and is not timed then; processor time of `evaluate` counts. A line per scene
-says the median of the ratios, new over old, and their lower and upper quarter.
+Each source has one process, which compiles first and is not timed then; processor time of `evaluate` counts. Of a command its
+own process counts, after one that fills the caches of bytecode and of compiled code. A line says the median of the ratios, new
+over old, and their lower and upper quarter.
 """
 
 import argparse
 import csv
 import datetime
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -36,6 +40,15 @@ CASES = {
     "four-stroke, gas table": (f"{LINKAGES}four_stroke", {"rod": (0.35, 0.65), "piston": (0.3, 0.5), "C": (1e-5, 5e-5)}),
 }  # fmt: skip
 """Scenes of `jobs/`, and the ranges that their designs are drawn from, SI."""
+
+STARTS = {
+    "check slider_crank": ("check", "--no-cost", f"{ROOT}/jobs/slider_crank.toml"),
+    "check quickstart": ("check", "--no-cost", f"{ROOT}/jobs/quickstart.toml"),
+    "report of a response": ("report", "response.nc"),
+    "simulate, compiled": ("simulate", f"{ROOT}/jobs/slider_crank.toml", "-o", "response.nc"),
+    "--help": ("--help",),
+}
+"""Commands, in a folder with a response."""
 
 LOAD = ["effects.slider_load=[[0, -2000], [1.5, -300], [3.1, 0], [5.5, -300]]"]
 
@@ -75,6 +88,26 @@ class Worker:
         return float(self._process.stdout.readline())
 
 
+class Starts:
+    """Commands of `STARTS` by the package below `root`, in a folder of their own."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        kept = {
+            name: word for name, word in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+        }
+        self._of = {"cwd": folder, "env": kept | {"PYTHONPATH": str(root)}}
+        folder.mkdir()
+        self.seconds("simulate, compiled")
+
+    def seconds(self, case: str) -> float:
+        """Processor time of one command, s: of user and system."""
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        words = [sys.executable, "-m", "hpcclear", *STARTS[case]]
+        subprocess.run(words, check=True, capture_output=True, **self._of)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
@@ -84,16 +117,22 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=256)
     parser.add_argument("--only", help="cases whose names contain this")
     parser.add_argument("--record", action="store_true", help=f"write {RESULTS.name}")
+    parser.add_argument("--starts", action="store_true", help="processor time of commands instead")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     words = parser.parse_args()
     if words.worker:
         return work(words.designs)
     with tempfile.TemporaryDirectory() as place:
-        old = Worker(sources(words.commit, Path(place) / "before"), words.designs)
-        new = Worker(ROOT, words.designs)
+        before = sources(words.commit, Path(place) / "before")
+        if words.starts:
+            old, new = Starts(before, Path(place) / "old"), Starts(ROOT, Path(place) / "new")
+        else:
+            old, new = Worker(before, words.designs), Worker(ROOT, words.designs)
         rows, run = [HEAD], [words.commit or "HEAD", processor(), f"{datetime.date.today()}"]
         print(f"{'scene':24s} {'before, s':>10s} {'ratio':>7s} {'quarters':>14s}")
-        for case in (one for one in CASES if (words.only or "") in one):
+        for case in (
+            one for one in (STARTS if words.starts else CASES) if (words.only or "") in one
+        ):
             old.seconds(case), new.seconds(case)  # compile
             pairs = [(old.seconds(case), new.seconds(case)) for _ in range(words.pairs)]
             before, after = np.array(pairs).T
@@ -105,7 +144,9 @@ def main() -> None:
             found = [f"{np.median(before):.3f}", *(f"{x:.3f}" for x in (middle, low, high))]
             rows.append([case, f"{words.pairs}", *found, *run])
     if words.record:
-        with RESULTS.open("w", newline="") as file:
+        with (RESULTS.with_name("starts.csv") if words.starts else RESULTS).open(
+            "w", newline=""
+        ) as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
 
 

@@ -26,7 +26,6 @@ MOST_WARNINGS = 3
 def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
-    from hpcclear.dynamics import sizing
     from hpcclear.dynamics.planar.problem import cautions_of
     from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
@@ -43,6 +42,8 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     turns = f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged"
     effects = scene.effects_on()
     if detailed():
+        from hpcclear.dynamics import sizing
+
         rows = [
             *((f"effect {k}", text) for k, text in enumerate(effects, 1)),
             (

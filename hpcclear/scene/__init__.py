@@ -1,8 +1,22 @@
 """Scenes: the TOML file that says what is simulated, validated and frozen."""
 
+from typing import TYPE_CHECKING
+
 from hpcclear.scene.describing import differences
 from hpcclear.scene.loading import load_scene
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.schema import scene_schema
+
+if TYPE_CHECKING:
+    from hpcclear.scene.schema import scene_schema
 
 __all__ = ["Scene", "differences", "load_scene", "scene_schema"]
+
+
+def __getattr__(name: str) -> object:
+    if name != "scene_schema":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from hpcclear.scene.schema import (
+        scene_schema,  # with the readers of files, whose entries it has
+    )
+
+    return scene_schema

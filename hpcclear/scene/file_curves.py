@@ -15,7 +15,7 @@ from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, Content, PositiveLength, Quantity, Table, invalid
-from hpcclear.scene.paths import curves, replace
+from hpcclear.scene.paths import curves, files_named, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 from hpcclear.scene.validation import validated
 
@@ -294,16 +294,6 @@ def with_values(
         text = f"{key}: {file!r} is read as {shown}, SHA-256 {digest[:16]}"
         read_as.append(plain(" ".join(text.split())))
     return content, read_as
-
-
-def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, object]]:
-    """Return the tables of a parsed scene that name a file, by their dotted keys."""
-    found: dict[str, Mapping[str, object]] = {}
-    for key, entry in content.items():
-        if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
-            path = f"{prefix}{key}"
-            found |= {path: entry} if "file" in entry else files_named(entry, f"{path}.")
-    return found
 
 
 def _with_values(

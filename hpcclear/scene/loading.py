@@ -10,8 +10,8 @@ from pathlib import Path
 import tomli_w
 
 from hpcclear.base.errors import InputError, content_of
-from hpcclear.scene.file_curves import files_named, with_values
 from hpcclear.scene.fitted import entry_replaced
+from hpcclear.scene.paths import files_named
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.syntax import fault
@@ -61,9 +61,12 @@ def load_scene(
     for override in overrides:
         content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
-    named = files_named(content)
-    filled, read_as = with_values(content, folder)
-    content = dict(filled)
+    named, read_as = files_named(content), list[str]()
+    if named:
+        from hpcclear.scene.file_curves import with_values  # with the readers of all kinds of files
+
+        filled, read_as = with_values(content, folder)
+        content = dict(filled)
     own_plugins = "plugins" in content
     if not trust:
         check_trust(content, "mapping" if text is None else str(source))

@@ -215,3 +215,13 @@ def flatten(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[s
             yield from flatten(value, f"{path}.")
         else:
             yield path, value
+
+
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, object]]:
+    """Return the tables of a parsed scene that name a file, by their dotted keys."""
+    found: dict[str, Mapping[str, object]] = {}
+    for key, entry in content.items():
+        if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
+            path = f"{prefix}{key}"
+            found |= {path: entry} if "file" in entry else files_named(entry, f"{path}.")
+    return found

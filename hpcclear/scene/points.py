@@ -6,22 +6,24 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.sheets import Sheet, read
 from hpcclear.scene.slider_crank import SliderCrank
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
+
+if TYPE_CHECKING:
+    from hpcclear.scene.delimited import SheetColumn
+    from hpcclear.scene.sheets import Sheet
 
 
 @dataclass(frozen=True)
@@ -239,6 +241,8 @@ def read_points(path: str | Path, scene: Scene) -> Points:
 
     Raises InputError if the file cannot be read, or a cell is no number; it names row (line of the file) and column.
     """
+    from hpcclear.scene.sheets import read  # with the readers of all kinds of files
+
     key, sheet = str(path), read(Path(path))
     labels, columns = [], []
     for column in sheet.columns:
@@ -266,9 +270,9 @@ class _Driven(NamedTuple):
     """A column of numbers of the scene, and the entries that it drives."""
 
     paths: tuple[str, ...]
-    column: SheetColumn
+    column: "SheetColumn"
 
-    def read(self, sheet: Sheet) -> Array:
+    def read(self, sheet: "Sheet") -> Array:
         """Its cells in SI, shape (n,), within the bounds of every entry it drives."""
         every = [quantities()[path] for path in self.paths]
         values = sheet.si(self.column, every[0].unit, sheet.path)
@@ -281,7 +285,7 @@ class _Driven(NamedTuple):
         return values
 
 
-def _driven(column: SheetColumn, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
+def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> _Driven | None:
     """What a column such as ``C [mm]`` drives, None if it names the rows."""
     numbers = scene.numeric_paths()
     of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}

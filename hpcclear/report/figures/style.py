@@ -310,9 +310,7 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
                     engine.check(figure)
                 else:
                     engine.execute(figure)
-                figure.set_layout_engine(
-                    None
-                )  # with one all would be drawn once more
+                figure.set_layout_engine(None)  # with one all would be drawn once more
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_STAMPS[kind][1])
         finally:
             if engine is not None:
