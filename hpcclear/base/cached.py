@@ -8,10 +8,11 @@ start of a command, and code that is compiled already calls nothing of it. Numba
 """
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MethodType
+from typing import TypeVar
 
 from llvmlite import ir
 from numba import config, njit, types
@@ -24,9 +25,10 @@ from numba.extending import lower_builtin, register_jitable, type_callable
 
 from hpcclear.base import bits, kept
 from hpcclear.base.code_folder import chosen_folder, source_key
-from hpcclear.base.jit import Function
 from hpcclear.base.lock import Lock
 from hpcclear.base.width import asked_width, features
+
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 @contextmanager
