@@ -10,7 +10,6 @@ from some_laws import row
 
 from hpcclear import simulate
 from hpcclear.base.errors import InputError
-from hpcclear.base.exponentials import falling
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.observe import observe

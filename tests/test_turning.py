@@ -17,7 +17,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.planar.turning import changes, refused
+from hpcclear.dynamics.planar.turning import changes, passage, refused
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
@@ -84,7 +84,7 @@ def test_four_bars_turn_where_grashof_says_so():
     sides = []
     for numbers, turns in random_four_bars(30):
         for open_pins in ((), ("o2", "o3")):
-            told = refused(four_bar(*numbers, open_pins), 0.0, 2)
+            told = refused(passage(four_bar(*numbers, open_pins), 0.0, 2))
             assert (told is None) == turns
             if told is not None:
                 assert told[0] is Status.CANNOT_TURN
@@ -174,9 +174,8 @@ def test_dead_centres_of_six_bars_are_where_determinants_vanish():
             ("o5", "coupler.tip", "link.a"), ("o6", "link.b", "arm.b"), ("o7", "arm.a", "ground.q"),
         )  # fmt: skip
         ground = {"o": (0.0, 0.0), "p": (g, 0.0), "q": (q.real, q.imag)}
-        told = refused(
-            Mechanism(bodies, pins(("o2", "o6"), *FOUR, *more), (MOTOR,), ground), 0.0, 1
-        )
+        made = Mechanism(bodies, pins(("o2", "o6"), *FOUR, *more), (MOTOR,), ground)
+        told = refused(passage(made, 0.0, 1))
         assert (told is None) == (expected is None)
         if told is not None:
             assert abs(where(told[1]) - expected) < math.radians(0.2)  # of steps of 0.4 degrees
@@ -187,10 +186,10 @@ def test_what_swings_is_walked_as_far_as_its_drive_swings_it():
     lock = lock_of(*numbers[:5])
     for share, locks in ((0.95, False), (1.05, True)):
         drive = harmonic("servo", "crank", share * (lock - 1.0), 2.0, mean=1.0)
-        told = refused(four_bar(*numbers, ("o3",), drive), 0.0, 1)
+        told = refused(passage(four_bar(*numbers, ("o3",), drive), 0.0, 1))
         assert (told is not None) == locks
     torque = torque_drive("engine", "crank", 3.0, 5.0)
-    assert refused(four_bar(*numbers, ("o3",), torque), 0.0, 1) is None  # it may swing
+    assert refused(passage(four_bar(*numbers, ("o3",), torque), 0.0, 1)) is None  # it may swing
 
 
 def test_a_locked_design_is_a_status_and_none_of_the_others_is_touched():
@@ -423,27 +422,28 @@ def test_change_points_that_clearance_decides_are_named_at_their_angles():
         for a, g in ((0.1, 0.2), (0.07, 0.11), (0.2, 0.13)):
             base = four_bar(a, g, a, g, 1.0, 1)
             opened = replace(base, joints=pins((pin,), *FOUR))
-            angles = np.array(changes(opened, 0.0, 1))
+            angles = np.array(changes(opened, passage(opened, 0.0, 1)))
             off = np.minimum(angles % 180.0, -angles % 180.0)
             assert len(angles) == 2
             np.testing.assert_allclose(off, 0.0, atol=0.1)
             assert abs(angles[1] - angles[0]) == pytest.approx(180.0, abs=0.1)
-            assert changes(base, 0.0, 1) == ()  # passed, and judged
+            assert changes(base, passage(base, 0.0, 1)) == ()  # passed, and judged
         rocking = four_bar(0.04, 0.12, 0.08, 0.13, 1.0, 1)
-        assert changes(replace(rocking, joints=pins((pin,), *FOUR)), 0.0, 1) == ()
+        rocks = replace(rocking, joints=pins((pin,), *FOUR))
+        assert changes(rocks, passage(rocks, 0.0, 1)) == ()
 
 
 def test_clearance_decides_at_a_change_point_unless_ideal_joints_alone_depend():
     base = four_bar(0.1, 0.2, 0.1, 0.2, 1.0, 1)
     opened = replace(base, joints=pins(("o3",), *FOUR))
-    assert refused(opened, 0.0, 1) is None
+    assert refused(passage(opened, 0.0, 1)) is None
     bodies = (*base.bodies, bar("link", 0.3, 0.2, 0.1), bar("arm", 0.25, 0.2, 1.5))
     more = (
         ("o5", "rocker.b", "link.a"), ("o6", "link.b", "arm.b"), ("o7", "arm.a", "ground.q"),
     )  # fmt: skip
     ground = {"o": (0.0, 0.0), "p": (0.2, 0.0), "q": (0.5, -0.05)}
     carried = Mechanism(bodies, pins(("o5", "o6"), *FOUR, *more), (MOTOR,), ground)
-    told = refused(carried, 0.0, 1)
+    told = refused(passage(carried, 0.0, 1))
     assert told is not None
     assert told[0] is Status.NEAR_SINGULAR
     assert where(told[1]) == pytest.approx(math.pi, abs=1e-3)
