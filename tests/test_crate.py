@@ -45,28 +45,6 @@ def test_every_result_is_described_and_made_by_one_run(results):
         assert graph[name]["sha256"] == hashlib.sha256(written).hexdigest()
 
 
-def test_the_input_is_the_studys_scene_and_every_one_where_there_are_more(results):
-    def restate(name: str, **attributes: str) -> None:
-        content = opened.read(results / name)
-        (results / name).unlink()
-        opened.write(content.assign_attrs(attributes), results / name)
-
-    def inputs() -> list[str]:
-        (results / NAME).unlink(missing_ok=True)
-        graph = json.loads(write_crate(results).read_text(encoding="utf-8"))["@graph"]
-        (run,) = [one for one in graph if one["@type"] == "CreateAction"]
-        used = run["object"] if isinstance(run["object"], list) else [run["object"]]
-        known = {one["@id"]: one.get("text") for one in graph}
-        return [known[one["@id"]] for one in used]
-
-    own = opened.read(results / "samples.nc").attrs["scene"]
-    restate("responses/original.nc", scene="a design of it", scene_hash="1" * 64)
-    assert inputs() == [own]
-    restate("timing.nc", scene="another", scene_hash="2" * 64, versions="numpy 9")
-    assert inputs() == [own, "another"]
-    assert "; numpy 9" in (results / NAME).read_text()
-
-
 def test_equal_results_give_equal_crates_and_other_files_stay(results):
     first = write_crate(results).read_bytes()
     assert write_crate(results).read_bytes() == first

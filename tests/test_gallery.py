@@ -1,8 +1,7 @@
-"""The linkages of the gallery: every effect on each of them, pairwise; on-at-zero equals off."""
+"""The linkages of the gallery: every effect on each of them, pairwise."""
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from margins import energy_closes
 from pairwise import CONTACTS, FRICTIONS, pairwise_table
@@ -67,33 +66,3 @@ def test_every_pair_of_effects_runs(row):
     assert int(response["status"]) == Status.OK
     energy_closes(response, 1e-4)
     assert (response["mean_gap"].to_numpy() > 0.0).all()
-
-
-ZEROS = {
-    "damping": (
-        {"effects.contact": {"law": "hunt-crossley", "damping": 0.0}},
-        {"effects.contact": {"law": "hertz"}},
-    ),
-    "friction": (
-        {"effects.friction": {"law": "coulomb", "coefficient": 0.0}},
-        {"effects.friction": {"law": "none"}},
-    ),
-}
-
-
-@pytest.mark.parametrize("zero", list(ZEROS))
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n == "v_twin" else pytest.mark.full) for n in NAMES]
-)
-@pytest.mark.shortened(1)
-def test_an_effect_at_zero_changes_nothing(name, zero):
-    """Poses to 1e-8 over a twentieth of a revolution: after that contact has multiplied the rounding too often."""
-    on, off = (
-        simulate(scene_of(name, **{"numerics.rtol": 1e-10, "numerics.method": "dormand-prince", **more}))
-        for more in ZEROS[zero]
-    )  # fmt: skip
-    early = slice(0, len(on["time"]) // 20)
-    np.testing.assert_array_equal(on["time"][early], off["time"][early])
-    for quantity in ("body_x", "body_y", "body_angle"):
-        a, b = on[quantity][early].to_numpy(), off[quantity][early].to_numpy()
-        assert (np.abs(a - b) <= 1e-8 * np.abs(b).max()).all()

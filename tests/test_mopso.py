@@ -329,13 +329,6 @@ def test_infinite_values_and_nan_violations_are_infeasible():
     assert (front.failed, front.infeasible) == (2, 1)
 
 
-def test_all_points_failed():
-    front = run(lambda x: np.full((len(x), 2), np.nan), 3, 0, 10)
-    assert front.failed == front.evaluations == 1000
-    assert front.points.shape == (0, 3)
-    assert "no feasible point" in front.remark
-
-
 def test_failed_points_still_lead_by_their_violation():
     """A model may leave the objectives of an infeasible point NaN and give the violation alone."""
 

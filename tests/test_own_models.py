@@ -246,21 +246,6 @@ def test_what_is_no_design_is_refused(asked, said):
     assert caught.value.key == "study.swarm.algorithm"
 
 
-def test_designs_beyond_the_evaluations_are_left_out_and_failures_told():
-    search = Fixed(np.array([[0.5, 1e-5]] * 5))
-
-    def half(points):
-        values = points.copy()
-        values[0] = np.nan
-        return values
-
-    front = asking.minimise(search, half, task(), 10)
-    assert [len(one[0]) for one in search.met] == [5, 5, 2]
-    assert (front.evaluations, front.failed) == (12, 3)
-    assert search.met[0][2].tolist() == [np.inf, 0.0, 0.0, 0.0, 0.0]
-    assert asking.minimise(Fixed(None), half, task(), 10).evaluations == 0
-
-
 @pytest.mark.parametrize(
     ("search", "said"),
     [

@@ -72,19 +72,6 @@ def test_a_series_that_was_changed_tells(made, tmp_path):
     assert differing.startswith("crank_moment (")
 
 
-def test_other_versions_are_named(made, tmp_path):
-    def age(content):
-        content.attrs["versions"] = content.attrs["versions"].replace("numpy ", "numpy 1.")
-        content.attrs["processor"] = "an abacus"
-
-    found = changed(made, tmp_path, "samples.nc", age)
-    assert found["differing"] == ()
-    texts = " / ".join(found["changed"])
-    assert "processor: an abacus, here " in texts
-    assert "numpy: 1." in texts
-    assert "scipy" not in texts
-
-
 def test_a_scene_that_reads_otherwise_is_not_simulated(made, tmp_path):
     def rehash(content):
         content.attrs["scene_hash"] = "0" * 64

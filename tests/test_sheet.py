@@ -4,7 +4,6 @@ import itertools
 from dataclasses import replace
 from pathlib import Path
 
-import commands
 import numpy as np
 import opened
 import pytest
@@ -110,22 +109,6 @@ def test_no_text_runs_off_the_sheet_or_over_another(seed: int, most: int) -> Non
     check_laid_out(sheets.draw(generated(seed, most)))
 
 
-def test_of_40_verdicts_the_red_ones_stay_and_the_rest_is_counted() -> None:
-    lines = [
-        Trust(
-            Level.RED if k % 10 == 0 else Level.GREEN,
-            f"constraint {k}: {text_of(np.random.default_rng(k), 90)}",
-        )
-        for k in range(40)
-    ]
-    figure = sheets.draw(SheetContent(Screen("Verdicts", trust=trusted(lines)), (), (), ()))
-    texts = [one.get_text() for one in figure.texts]
-    assert texts.count("■ red") == 4
-    (left,) = [text for text in texts if text.startswith("and ")]
-    assert int(left.split()[1]) == 40 - 4 - texts.count("● green")
-    check_laid_out(figure)
-
-
 def written(directory: Path, kind: str) -> Path:
     """A directory with results of a kind."""
     if kind == "study":
@@ -171,13 +154,6 @@ def test_the_sheet_holds_what_the_first_screen_says(tmp_path: Path, monkeypatch,
     assert "Signature" in said
     assert "0" * 64 in said
     check_laid_out(drawn[0])
-
-
-def test_the_command_writes_the_sheet(tmp_path: Path) -> None:
-    code, printed = commands.warm_command("report", written(tmp_path, "samples"), "--sheet")
-    assert code == 0
-    assert f"sheet  {tmp_path / 'sheet.pdf'}" in printed
-    assert not (tmp_path / "report.html").exists()
 
 
 ABOUT = {

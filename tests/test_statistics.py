@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-import xarray as xr
 from commands import finish, start
 from streaming_run import make_made_up, scene_of
 
@@ -217,17 +216,6 @@ def test_samples_that_were_not_kept_are_not_promised(tmp_path):
     (raw / "samples-00000001.nc").unlink()  # as after a stop that left some
     with pytest.raises(InputError, match="were not kept"):
         run_statistics(scene, output, alone(), raw=raw, options=QUIET)
-
-
-@pytest.mark.nightly
-@pytest.mark.mpi
-def test_samples_summed_up_without_files_are_made_again(tmp_path):
-    output, raw = tmp_path / "out.nc", tmp_path / "raw"
-    assert launch(2, output, 60_000, FAILS="1")[0] == 1
-    code, told = launch(2, output, 60_000, RAW=str(raw))
-    assert code == 0, told
-    assert "simulated again" in told
-    assert sum(xr.load_dataset(one).sizes["sample"] for one in raw.glob("samples-*.nc")) == 60_000
 
 
 def peak(output: Path, samples: int) -> float:
