@@ -1,9 +1,10 @@
 """How long the answers of all commands are: lines and columns that each prints, beside those of another version.
 
-    python analysis/terminal.py [--before PROGRAM]
+    python analysis/terminal.py [--before PROGRAM] [--keep DIRECTORY]
 
-PROGRAM is the Python of an environment with the other version. Runs short jobs, prints a row a command, and writes
-``analysis/results/terminal.csv``. What a terminal shows counts, notes and the last line of progress as well. Help is left out.
+PROGRAM is the Python of an environment with the other version; DIRECTORY gets what the commands of this one print. Runs short
+jobs, prints a row a command, and writes ``analysis/results/terminal.csv``. What a terminal shows counts, notes and the last
+line of progress as well. Help is left out.
 """
 
 import argparse
@@ -59,7 +60,7 @@ def extent(text: str) -> tuple[int, int]:
     return len(lines), max(map(len, lines), default=0)
 
 
-def answers(program: str) -> dict[str, tuple[int, int]]:
+def answers(program: str, keep: Path | None = None) -> dict[str, tuple[int, int]]:
     """What each command prints, by the command; nothing of one that failed."""
     found = {}
     with tempfile.TemporaryDirectory() as place:
@@ -73,6 +74,9 @@ def answers(program: str) -> dict[str, tuple[int, int]]:
                 print(f"{command}: exit code {done.returncode}\n{done.stdout}", file=sys.stderr)
                 continue
             found[command] = extent(done.stdout)
+            if keep:
+                keep.mkdir(parents=True, exist_ok=True)
+                (keep / f"{len(found):02d}.txt").write_text(f"{command}\n{done.stdout}")
             print(*found[command], command, flush=True)
     return found
 
@@ -81,8 +85,10 @@ def main() -> None:
     """Measure, compare, record."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--before", metavar="PROGRAM")
+    parser.add_argument("--keep", type=Path, metavar="DIRECTORY")
     options = parser.parse_args()
-    now, then = answers(sys.executable), answers(options.before) if options.before else {}
+    now = answers(sys.executable, options.keep)
+    then = answers(options.before) if options.before else {}
     rows = [
         (
             command.split(" --set")[0].replace("JOBS", "jobs"),

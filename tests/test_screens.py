@@ -48,7 +48,7 @@ KINDS = {
     "response": Seen(STUDY, ("bearings",)),
     "life": Seen(STUDY, ("lives",)),
     "map": Seen(STUDY, ("reproduce",)),
-    "identification": Seen(("h1", ".first tbody tr", ".tiles > div"), ("identify",)),
+    "identification": Seen(("h1", ".tiles > div", ".trust li"), ("identify",)),
 }
 
 

@@ -135,7 +135,7 @@ _REGIMES = {
     Regime.SETTLING: "still settling: the average has not converged",
     Regime.UNSTEADY: "unsteady: the average drifts, there is no steady mean",
     Regime.CHAOTIC: "chaotic: the smallest perturbation grows to the size of the motion",
-    Regime.SEVERAL: "several orbits: the smallest perturbation decides which one is reached",
+    Regime.SEVERAL: "several motions: the smallest change of the start decides which one runs",
 }
 
 

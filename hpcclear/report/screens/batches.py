@@ -134,37 +134,25 @@ def map_of_motion(content: Content) -> Screen | None:
     f, unit = found["objective"].to_numpy()[good], str(found["objective"].attrs["units"])
     headline = "Every cell failed"
     if kinds:
-        words = [f"{regime.name.lower()} in {n} of {cells} cells" for regime, n in kinds[:2]]
-        headline = f"Motion: {', '.join(words)}"
-    tiles = [
-        Tile(f"{regime.meaning.partition(':')[0]} cells", f"{n}", within=f"of {cells}")
-        for regime, n in kinds[:2]
-    ]
+        (most, _, why), *rest = (regime.meaning.partition(":") for regime, _ in kinds[:2])
+        headline = f"{most.capitalize()} at {kinds[0][1]} of {cells} places{why and ':'}{why}"
+        headline += "".join(f"; {kind} at {kinds[1][1]}" for kind, *_ in rest)
+    tiles: tuple[Tile, ...] = ()
     if len(growth):
-        tiles.append(
-            Tile("largest Lyapunov exponent", f"{growth.max():.3g}", within="per revolution")
+        tiles = (
+            Tile("largest Lyapunov exponent", f"{growth.max():.3g}", within="per revolution"),
+            Tile("period", known or "none", within="revolutions"),
+            Tile("f", labels.between(float(f.min()), float(f.max()), unit)),
         )
-        tiles.append(Tile("period", known or "none", within="revolutions"))
-        tiles.append(Tile("f", labels.between(float(f.min()), float(f.max()), unit)))
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    trust = [
-        Trust(
-            Level.GREEN if count == cells else Level.AMBER,
-            f"{count} of {cells} cells without failure",
-            "quality",
-        )
-    ]
+    level = Level.GREEN if count == cells else Level.AMBER
+    trust = [Trust(level, f"{count} of {cells} cells without failure", "quality")]
     open_ = sum(
         n for regime, n in kinds if regime in (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
     )
     if open_:
-        trust.append(
-            Trust(
-                Level.AMBER,
-                f"{open_} cells have not settled: longer transients would decide",
-                "quality",
-            )
-        )
+        text = f"{open_} cells have not settled: longer transients would decide"
+        trust.append(Trust(Level.AMBER, text, "quality"))
     if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
         level = Level.RED if share > MOST else Level.AMBER
         trust.append(
@@ -178,7 +166,7 @@ def map_of_motion(content: Content) -> Screen | None:
     return Screen(
         headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
         "the contact model is outside its range" if share > MOST else "",
-        tuple(tiles[:4]), ("motion", "cells") if rows else (), rows, trust=trusted(trust, share > MOST),
+        tiles, ("motion", "cells") if rows else (), rows, trust=trusted(trust, share > MOST),
         figures=("map",),
     )  # fmt: skip
 

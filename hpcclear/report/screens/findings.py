@@ -1,6 +1,7 @@
 """First screens of commands that answer one question: an identified machine, effects, accuracy against run time."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
+
+MOST = 4
+"""Unknowns of a record that have a figure; where there are more, all are in the table."""
 
 
 def machine(content: Content) -> Screen | None:
@@ -35,21 +39,25 @@ def machine(content: Content) -> Screen | None:
     unknown = _unknowns(found) if known else []
     headline = "What to measure: expected half-widths of each signal"
     if unknown:
-        headline = "; ".join(f"{label}: {text}" for label, text in unknown[-2:])
+        last = unknown[-found.sizes["unknown"] :]
+        headline = "; ".join(f"{label}: {text}" for label, text in last[:2])
     failed = known and not found["explained"].to_numpy().all()
     tiles = [
         Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
         for label, text in unknown
     ]
+    above = {label.partition(",")[0] for label, _ in unknown if len(unknown) <= MOST}
     rows = tuple(
-        ScreenRow(line.label, (line.text,)) for line in lines if line.label != "calibration"
+        ScreenRow(line.label, (line.text,))
+        for line in lines
+        if line.label not in above | {"calibration"}
     )
     return Screen(
         headline,
         (f"measured records: {found.sizes['record']}",) if known else (),
         "the model does not explain every signal" if failed else "",
-        tuple(tiles[-4:]),
-        ("quantity", "result"),
+        tuple(tiles[-MOST:]),
+        ("quantity", "result") if rows else (),
         rows,
         trust=trusted(trust),
         figures=("posterior", "features") if known else (),
@@ -57,11 +65,13 @@ def machine(content: Content) -> Screen | None:
 
 
 def _unknowns(found: Results) -> list[tuple[str, str]]:
-    """Unknowns of each record with their intervals, in words."""
+    """Unknowns of each record with their intervals, in words; of several records with their names."""
+    records, names = found["record"].to_numpy(), found["unknown"].to_numpy()
+    ends = [f", {Path(str(one)).name}" * (len(records) > 1) for one in records]
     return [
-        (identified.short(name), identified.interval(found, k, u))
-        for k in range(found.sizes["record"])
-        for u, name in enumerate(found["unknown"].to_numpy())
+        (identified.short(name) + end, identified.interval(found, k, u))
+        for k, end in enumerate(ends)
+        for u, name in enumerate(names)
     ]
 
 
