@@ -22,7 +22,7 @@ from hpcclear.study.run import Result, StudyRun
 FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
-LOOK = 4
+LOOK = 8
 """Points of each replicate of every verified design, at most; those that decide get more."""
 
 QUANTILE = 0.95

@@ -166,7 +166,8 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
         moved, good = ("", None) if before is None else change(mine, before)
         shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
-            yield Tile(words, shown, "".join(old), moved, within(*mine, unit), good)
+            better = None if verdict_of(best) in _INFEASIBLE else good  # no gain without a design
+            yield Tile(words, shown, "".join(old), moved, within(*mine, unit), better)
     yield from _peaks(best, base, content)
 
 
