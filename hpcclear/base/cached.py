@@ -16,12 +16,14 @@ from typing import TypeVar
 
 from llvmlite import ir
 from numba import config, njit, types
-from numba.core import environment
+from numba.core import cgutils, environment
+from numba.core.base import BaseContext
 from numba.core.caching import Cache, IndexDataCacheFile, NullCache
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
-from numba.extending import lower_builtin, register_jitable, type_callable
+from numba.core.typing import Signature
+from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
 
 from hpcclear.base import bits, kept
 from hpcclear.base.code_folder import chosen_folder, source_key
@@ -170,7 +172,26 @@ def _convert(function: Function, given: types.Type, made: types.Type, to: ir.Typ
     lower_builtin(function, given)(lower)
 
 
+@intrinsic
+def _called_at(
+    typing: object, address: types.Type, arrays: types.Type
+) -> tuple[Signature, Callable[..., ir.Value]]:
+    """Tell Numba of `bits.call_at`."""
+
+    def lower(
+        context: BaseContext, builder: ir.IRBuilder, signature: Signature, values: list[ir.Value]
+    ) -> ir.Value:
+        parts = zip(arrays.types, cgutils.unpack_tuple(builder, values[1]), strict=True)
+        places = [context.make_array(kind)(context, builder, part).data for kind, part in parts]
+        function = ir.FunctionType(ir.VoidType(), [place.type for place in places])
+        builder.call(builder.inttoptr(values[0], function.as_pointer()), places)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, arrays), lower
+
+
 _prepare()
+overload(bits.call_at)(lambda address, arrays: lambda address, arrays: _called_at(address, arrays))
 _convert(bits.bits_of, types.float64, types.int64, ir.IntType(64))
 _convert(bits.double_of, types.int64, types.float64, ir.DoubleType())
 register_jitable(bits.no_less)
