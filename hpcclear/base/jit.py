@@ -18,7 +18,7 @@ def narrow_vectors() -> None:
     """
 
 
-class Written:
+class KernelFunction:
     """A function of the kernel, for the lowering to write out.
 
     Where Python or a function of Numba's calls it, Numba compiles it, and is loaded for that only: a fifth of the start of a
@@ -58,7 +58,7 @@ class Written:
 
 def lane_function(function: Function, fastmath: set[str] = FASTMATH) -> Function:
     """Compile what runs inside a loop over lanes: inlined, branch-free, vectorised there."""
-    return Written(function, "lane", forceinline=True, fastmath=fastmath)  # type: ignore[return-value]
+    return KernelFunction(function, "lane", forceinline=True, fastmath=fastmath)  # type: ignore[return-value]
 
 
 def apart(compiled: Function) -> Function:
@@ -74,4 +74,4 @@ def apart(compiled: Function) -> Function:
 
 def scalar_function(function: Function) -> Function:
     """Compile what runs for one lane or one point at a time."""
-    return Written(function, "scalar")  # type: ignore[return-value]
+    return KernelFunction(function, "scalar")  # type: ignore[return-value]

@@ -46,9 +46,9 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     command = "sample" if plan.study is None else "run"
     made = Table(
         title=f"{command}: {simulations} simulations on {counted(ranks)}", title_justify="left",
-        box=box.SIMPLE_HEAD, pad_edge=False,
+        box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0),
     )  # fmt: skip
-    for name in ("error of f", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+    for name in ("error of f", "settings", "ms/sample", "core-h", "wall time"):
         made.add_column(
             name,
             no_wrap=name != "settings",
@@ -62,7 +62,6 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
             one.settings(),
             f"{1e3 * one.seconds:.3g}"
             + (f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""),
-            f"{total:.3g}",
             f"{total / 3600:.2g}",
             duration(plan.wall_seconds(one, simulations, ranks)),
         )
