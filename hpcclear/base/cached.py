@@ -161,7 +161,7 @@ def inlined(function: Function, **options: object) -> Function:
 
 
 def _convert(function: Function, given: types.Type, made: types.Type, to: ir.Type) -> None:
-    """Tell Numba of a function that reads the bits of a number of one type as one of another."""
+    """Register a function with Numba that reads the bits of a number as another type."""
 
     def lower(
         context: object, builder: ir.IRBuilder, signature: object, values: list[ir.Value]
@@ -176,7 +176,7 @@ def _convert(function: Function, given: types.Type, made: types.Type, to: ir.Typ
 def _called_at(
     typing: object, address: types.Type, arrays: types.Type
 ) -> tuple[Signature, Callable[..., ir.Value]]:
-    """Tell Numba of `bits.call_at`."""
+    """Numba's form of `bits.call_at`."""
 
     def lower(
         context: BaseContext, builder: ir.IRBuilder, signature: Signature, values: list[ir.Value]

@@ -305,9 +305,7 @@ class CaseSearch:
         ):
             return np.zeros(len(self.choices))
         sizes = [one.shape[2] for one in self.made if one.size]
-        both = [
-            (k, min(size, sizes[row])) for k, size in enumerate(sizes)
-        ]  # points that both have met
+        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points in common
         shifts = np.array([self._at(k, n)[1] - self._at(row, n)[1] for k, n in both])
         return np.nan_to_num(spread(np.einsum("knr,n->kr", shifts, direction)))
 

@@ -137,7 +137,7 @@ def _spent(study: Study, case: Case, its: float) -> tuple[float, float]:
     verified += WEIGHED * verdicts.usual_in(case, settings)
     shown = [_shown_by(one, study) for one in case.kept if not one.exact]
     verified += SHOWN * max(shown, default=0.0)
-    return (begun + min(part, 1.0) * further) / len(study.cases), verified
+    return (begun + np.clip(part, 0.0, 1.0) * further) / len(study.cases), verified
 
 
 def _looked(study: Study) -> float:
