@@ -11,6 +11,8 @@ from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Beliefs, Known, Space
 from hpcclear.study import extent
+from hpcclear.study.case_search import CaseSearch
+from hpcclear.study.optimisation import Choice
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -155,8 +157,6 @@ def test_only_designs_of_a_catalogue_are_asked_for():
     np.testing.assert_allclose(designs[:, 0] * 10.0, np.round(designs[:, 0] * 10.0))
 
 
-# -- a study ----------------------------------------------------------------------------------------
-
 STUDY = """
 [variables]
 m3 = { range = [0.07, 0.28] }
@@ -192,6 +192,16 @@ def test_a_search_ends_at_the_front(done):
     counted = extent.samples_of(study())
     samples = opened.read(done / "samples.nc", "samples")
     assert samples.sizes["sample"] < sum(counted.values())
+
+
+def test_designs_are_compared_by_points_that_both_have_met():
+    """f of one is that of the other and a constant: their difference is known, however few points one has."""
+    f, case = np.random.default_rng(7).normal(1.0, 0.1, (16, 32)), study().required_study.cases[0]
+    one = object.__new__(CaseSearch)
+    one._case, one._seen = case, {}
+    one.choices = [Choice("", "robust", {"m2": 0.2, "m3": 0.1})] * 2
+    one.made = [np.stack([f, 0.0 * f]), np.stack([f + 0.5, 0.0 * f])[..., :4]]
+    np.testing.assert_allclose(one._apart(0, np.array([1.0, 0.0])), 0.0, atol=1e-12)
 
 
 @pytest.mark.nightly

@@ -87,9 +87,6 @@ def places(found: xr.Dataset) -> np.ndarray:
     return on_sphere(*(found[name].to_numpy() for name in ("m2", "m3", "u2")))
 
 
-# -- the front --------------------------------------------------------------------------------------
-
-
 def test_what_is_told_of_designs_is_where_they_lie(study: Path) -> None:
     found = verified(study)
     true = places(found) * (UNIT, UNIT, 1.0) + (UNIT * MEAN, UNIT * DEVIATION, 0.0)
@@ -186,9 +183,6 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     assert all(p["at"][2] is None for p in shown["points"] if p["case"] == "plain")
 
 
-# -- what is told -----------------------------------------------------------------------------------
-
-
 def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     content = read(study)
     shown = picture.front(content)
@@ -210,9 +204,6 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     assert any(row[0] == f"lowest {THIRD} (gamma)" for row in table.rows)
 
 
-# -- designs that are known with errors -------------------------------------------------------------
-
-
 def replicates(values: np.ndarray, error: float, seed: int = 1) -> np.ndarray:
     """Shifts (m, n, 16) of independent designs."""
     return np.random.default_rng(seed).normal(0.0, error, (*values.T.shape, 16))
@@ -229,9 +220,6 @@ def test_the_front_of_three_is_what_is_surely_traded() -> None:
     assert front[3] in (3, 4)
     assert found.one[3, 4]
     np.testing.assert_array_equal(found.beaten, [False] * 5 + [True])
-
-
-# -- what is refused --------------------------------------------------------------------------------
 
 
 MANY = '["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]'
