@@ -69,13 +69,7 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Sce
 
 
 def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics: Any) -> Integrator:
-    """A method of the kernel.
-
-    Raises
-    ------
-    InputError
-        If this scene cannot be integrated so.
-    """
+    """A method of the kernel. Raises InputError if this scene cannot be integrated so."""
     problem_of(one_turn(scene, **numerics))  # refuses what there is not
 
     def prepare(rtol: float) -> tuple[Run, float]:

@@ -168,10 +168,7 @@ def measure(
     progress_style : {"auto", "bar", "log", "quiet"}
         How the samples of a measurement are counted on standard error.
 
-    Raises
-    ------
-    InputError
-        If the scene has no study.
+    Raises InputError if the scene has no study.
     """
     study = scene.study
     few = scene
@@ -313,10 +310,7 @@ def _end_with_input() -> None:
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
     """Errors to measure: `TARGETS`, and the requested one; none for service lives, which have replicas of their own.
 
-    Raises
-    ------
-    InputError
-        Service lives cannot be simulated, or an error was requested that they do not use.
+    Raises InputError: service lives cannot be simulated, or an error was requested that they do not use.
     """
     lives.check(scene)
     study = scene.study

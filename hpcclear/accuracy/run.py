@@ -45,10 +45,7 @@ def measure(
     xarray.Dataset
         Kind ``accuracy``.
 
-    Raises
-    ------
-    InputError
-        If both joints are ideal: the objective is 0 then, whatever the settings.
+    Raises InputError if both joints are ideal: the objective is 0 then, whatever the settings.
     """
     if scene.objective.joints:
         raise InputError(
@@ -83,11 +80,7 @@ def run_accuracy(
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 
     Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from
-    there. `notify` gets what is going on, a line at a time.
-
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    there. `notify` gets what is going on, a line at a time. Raises InputError, StorageError, Stopped, RankFailed.
     """
     from hpcclear.report.figures import accuracy as accuracy_figures
     from hpcclear.report.figures import style

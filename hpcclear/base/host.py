@@ -94,12 +94,8 @@ def is_running(pid: int) -> bool:
 def lock_file(descriptor: int, shared: bool = False) -> None:
     """Take an advisory lock on an open file (flock), which ends with the process.
 
-    Raises
-    ------
-    BlockingIOError
-        Another process holds it.
-    OSError
-        The file system, or the system (errno ENOSYS), has no such locks.
+    Raises BlockingIOError: another process holds it. Raises OSError: the file system, or the system (errno ENOSYS), has no
+    such locks.
     """
     try:
         import fcntl

@@ -133,12 +133,8 @@ class Lock:
     name : str
         Name of the lock file in it.
 
-    Raises
-    ------
-    InputError
-        On entry: another run holds the lock, or the directory cannot be written to.
-    StorageError
-        On entry: the disk fails.
+    Raises InputError on entry: another run holds the lock, or the directory cannot be written to. Raises StorageError on
+    entry: the disk fails.
     """
 
     def __init__(self, directory: Path, name: str = ".hpcclear.lock") -> None:

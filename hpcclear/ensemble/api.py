@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     """Designs from a mapping of name or scene path to values, shape (n,) or a scalar, SI.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown or a design makes no mechanism.
+    Raises InputError if a name is unknown or a design makes no mechanism.
     """
     if isinstance(points, Points):
         return points
@@ -49,10 +46,7 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
 def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
     """Scene entries that a name drives: the study's, a short name's, or a path itself.
 
-    Raises
-    ------
-    InputError
-        If it is not one of these.
+    Raises InputError if it is not one of these.
     """
     if scene.study is not None and name in scene.study.names:
         return scene.study.variable(name).paths

@@ -97,9 +97,7 @@ def run_bifurcation(
     output : Path
         NetCDF file of kind ``bifurcation``.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     place = Place.of_file(output, options.fresh)

@@ -56,9 +56,7 @@ def run_effects(
     output : Path
         NetCDF file of kind ``effects``.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     trial = Trial(scene)
@@ -115,10 +113,7 @@ def times_of(seconds: Mapping[str, Sequence[float]]) -> dict[str, str]:
 def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, str]) -> Results:
     """An effect screening as a dataset of kind ``effects``.
 
-    Raises
-    ------
-    InputError
-        The objective is zero with all effects on, so that no change of it is relative to anything.
+    Raises InputError: the objective is zero with all effects on, so that no change of it is relative to anything.
     """
     book, plan, variants = found.book, found.book.plan, found.variants
     whole = book.all(())

@@ -28,10 +28,7 @@ if TYPE_CHECKING:
 def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; bounds in SI or with a unit.
 
-    Raises
-    ------
-    InputError
-        If the words do not say that.
+    Raises InputError if the words do not say that.
     """
     name, _, rest = words.partition("=")
     parts = rest.split(":")
@@ -80,10 +77,7 @@ def number_of(key: str, words: str, unit: str) -> float:
 def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]:
     """All cells of a grid, the first entry's values changing slowest, and how many there are along each.
 
-    Raises
-    ------
-    InputError
-        If an axis is not one, two are the same, or a cell makes no mechanism.
+    Raises InputError if an axis is not one, two are the same, or a cell makes no mechanism.
     """
     parsed = [axis(scene, words) for words in axes]
     names = tuple(name for name, _, _ in parsed)
@@ -131,9 +125,7 @@ def run_map(
     output : Path
         NetCDF file of kind ``samples``, a sample a cell; `grid` gives it back as a grid.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     place = Place.of_file(output, options.fresh)

@@ -50,10 +50,7 @@ def repeated(place: Path, count: int) -> Iterator[Repeated]:
     Repeated
         Of each file that was read, in order; of a damaged one in a directory, too.
 
-    Raises
-    ------
-    InputError
-        There is no result file; or `place` is a file that is damaged, or was made from no valid scene.
+    Raises InputError: there is no result file; or `place` is a file that is damaged, or was made from no valid scene.
     """
     if not place.is_dir():
         yield from _repeated(dataset.read(place), str(place), count)

@@ -40,10 +40,7 @@ NOTABLE = 1.0
 def design(scene: Scene, table: Path | None) -> Points:
     """The points to simulate: a user's table, or the study's sampling.
 
-    Raises
-    ------
-    InputError
-        If there is neither, or a point makes no mechanism.
+    Raises InputError if there is neither, or a point makes no mechanism.
     """
     if table is not None:
         return read_points(table, scene)
@@ -82,9 +79,7 @@ def run_sample(
     Finished
         The samples.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     points = design(scene, table)
@@ -162,12 +157,7 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
     output : Path
         The name that was given with each part.
 
-    Raises
-    ------
-    InputError
-        Parts are missing, damaged, or another run's.
-    StorageError
-        The disk refuses.
+    Raises InputError: parts are missing, damaged, or another run's. Raises StorageError: the disk refuses.
     """
     began = time.perf_counter()
     place = Place.of_file(output, False)
@@ -252,12 +242,7 @@ def sample_points(
     structured ndarray of `record`, shape (n,)
         In the points' order; samples numbered from 0.
 
-    Raises
-    ------
-    Stopped, RankFailed, InputError
-        As `hpcclear.ranks.leading.run_points`.
-    StorageError
-        The disk refuses.
+    Raises Stopped, RankFailed, InputError as `hpcclear.ranks.leading.run_points`. Raises StorageError: the disk refuses.
     """
     sent = expanded(scene.study, points)  # rows of catalogues as the numbers they stand for
     record = record_of(scene) if record is None else record

@@ -87,10 +87,7 @@ class Place:
     def of_file(cls, output: Path, fresh: bool) -> Self:
         """A single file, with a hidden directory beside it; `fresh`: another one, if anything is there.
 
-        Raises
-        ------
-        InputError, StorageError
-            Nothing can be written there.
+        Raises InputError, StorageError: nothing can be written there.
         """
         if not (fresh and output.is_file()):  # which stays as it is
             files.refuse_foreign(output, netcdf.SEAL)
@@ -118,10 +115,7 @@ class Place:
     ) -> Self:
         """A directory of one run, made if its parent exists; `fresh`: another one, if anything is in it.
 
-        Raises
-        ------
-        InputError, StorageError
-            It cannot be made.
+        Raises InputError, StorageError: it cannot be made.
         """
         try:
             if fresh and directory.exists() and any(directory.iterdir()):
@@ -140,11 +134,8 @@ class Place:
         """Refuse a directory in which another run is at work or has left results; call it with the lock held.
 
         A file goes into any directory but that of another run; a run's directory holds results with its own key only. Both
-        sides take their own lock before they look at those of others, so that of two at least one sees the other.
-
-        Raises
-        ------
-        InputError
+        sides take their own lock before they look at those of others, so that of two at least one sees the other. Raises
+        InputError.
         """
         folder = self.lock.parent
         if self.guest:

@@ -62,11 +62,7 @@ def responses_of(
     -------
     ndarray, shape (variants, copies, *shape)
 
-    Raises
-    ------
-    Stopped, RankFailed, InputError
-    StorageError
-        The disk refuses a checkpoint.
+    Raises Stopped, RankFailed, InputError. Raises StorageError: the disk refuses a checkpoint.
     """
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
     payload = ResponsesPayload(content_of(scene), variants, evaluate, dtype, together)

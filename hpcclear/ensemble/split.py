@@ -58,10 +58,7 @@ class Part:
 def whole(output: Path) -> list[Part]:
     """All parts of a result, by the names of the files that are there.
 
-    Raises
-    ------
-    InputError
-        There is none, some are missing, or they are of different divisions.
+    Raises InputError: there is none, some are missing, or they are of different divisions.
     """
     escaped = (re.escape(word) for word in (output.stem, output.suffix))
     form = re.compile(r"{}\.part-(\d+)-of-(\d+){}".format(*escaped))

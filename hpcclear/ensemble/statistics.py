@@ -75,9 +75,7 @@ def run_statistics(
     Finished
         The statistics.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     if scene.study is None or scene.study.method != "monte-carlo":
@@ -111,9 +109,7 @@ def run_statistics(
 def _keeping(raw: Path | None, session: Session) -> Iterator[Path | None]:
     """The directory for samples themselves, locked and without those of another run; another one beside it with ``--fresh``.
 
-    Raises
-    ------
-    InputError, StorageError
+    Raises InputError, StorageError.
     """
     if raw is None:
         yield None

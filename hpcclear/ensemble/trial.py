@@ -132,10 +132,7 @@ class Trial:
     kept : dict of str to str
         Effects that cannot be off by themselves, by name, and why.
 
-    Raises
-    ------
-    InputError
-        The scene has no effect that could be off.
+    Raises InputError: the scene has no effect that could be off.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -201,13 +198,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Screening:
-        """What is required of the effect screening.
-
-        Raises
-        ------
-        InputError
-            The tolerance is none.
-        """
+        """What is required of the effect screening. Raises InputError: the tolerance is none."""
         if not 0.0 < wanted.tolerance < 1.0:
             raise InputError(
                 "--tolerance", wanted.tolerance, "is not a relative change above 0 and below 1", "Write 1%, or 0.01"

@@ -36,12 +36,7 @@ PERTURBATION = 1e-9
 
 
 def check_worn(scene: Scene) -> None:
-    """Refuse a scene that has no lives to follow.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a scene that has no lives to follow. Raises InputError."""
     if scene.wear is None:
         raise InputError(
             "wear", None, "the scene has no [wear] table", "Add [wear], as in jobs/wear.toml"
@@ -274,9 +269,7 @@ def run_wear(
     timing : Path, optional
         Where the times go, beside the output by default.
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     check_worn(scene)

@@ -52,9 +52,7 @@ def run_identify(
     settings : Settings
     options : Options
 
-    Raises
-    ------
-    InputError, StorageError, Stopped, RankFailed
+    Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     if not settings.signals and not settings.advise:

@@ -22,10 +22,7 @@ class History(NamedTuple):
 def seconds_of(dates: tuple[str, ...], count: int) -> Array:
     """Return the times (count,) of measurements, s after the first; 0, 1 day, ... without dates.
 
-    Raises
-    ------
-    InputError
-        A date is none, there are too few, or they do not rise.
+    Raises InputError: a date is none, there are too few, or they do not rise.
     """
     if not dates:
         return DAY * np.arange(float(count))

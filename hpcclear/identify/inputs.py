@@ -74,10 +74,7 @@ class Inputs:
     def of(cls, scene: Scene, unknowns: Sequence[str]) -> "Inputs":
         """Return the unknowns, and the random inputs of the scene's study that drive other entries.
 
-        Raises
-        ------
-        InputError
-            There is no unknown, or two drive the same entry, or a bound makes no mechanism.
+        Raises InputError: there is no unknown, or two drive the same entry, or a bound makes no mechanism.
         """
         if not unknowns:
             remedy = "Give --unknown joints.crank_rod.clearance=10um:150um, say"

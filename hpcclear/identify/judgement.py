@@ -110,10 +110,7 @@ def prepare(
 ) -> Prepared:  # fmt: skip
     """Fit and calibrate models for signals with features of these variances (p,).
 
-    Raises
-    ------
-    InputError
-        Fewer members than the models need.
+    Raises InputError: fewer members than the models need.
     """
     with threadpool_limits(limits=1, user_api="blas"):  # more threads change the last bits
         return _prepared(ensemble, layouts, sensor, frequency, variance, seed, members)

@@ -46,10 +46,7 @@ def write_made(
     response : xarray.Dataset, optional
         Of the scene, with one revolution more than is written; by default it is simulated here.
 
-    Raises
-    ------
-    InputError
-        The simulation fails.
+    Raises InputError: the simulation fails.
     """
     if response is None:
         longer = {"numerics.averaged_revolutions": revolutions + 1}

@@ -70,10 +70,7 @@ def read_measured(
     turns, sense : int
         Turns of the crank in a revolution of the drive, and -1 where the crank turns clockwise.
 
-    Raises
-    ------
-    InputError
-        The table cannot be read, lacks the signal, or has too few revolutions.
+    Raises InputError: the table cannot be read, lacks the signal, or has too few revolutions.
     """
     sheet = read_series(path)
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
@@ -119,10 +116,8 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     words : str
         ``COLUMN=AREA``: the pressure pushes the piston towards the crank.
 
-    Raises
-    ------
-    InputError
-        The words are another thing, the table lacks the angle or the column, or the scene is of another mechanism.
+    Raises InputError: the words are another thing, the table lacks the angle or the column, or the scene is of another
+    mechanism.
     """
     name, _, size = words.partition("=")
     if not size:

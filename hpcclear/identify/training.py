@@ -96,11 +96,7 @@ def ensemble_of(
     quiet : bool
         Whether nothing is printed meanwhile.
 
-    Raises
-    ------
-    InputError
-        More than `LARGEST_FAILURE` of the members fail.
-    Stopped, RankFailed, StorageError
+    Raises InputError: more than `LARGEST_FAILURE` of the members fail. Raises Stopped, RankFailed, StorageError.
     """
     places = design(seed, inputs, members)
     variants = inputs.variants(places)

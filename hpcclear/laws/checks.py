@@ -352,11 +352,5 @@ def _checked(law: Law, values: tuple[tuple[str, object], ...]) -> None:
 
 
 def check(law: Law, values: Mapping[str, object]) -> None:
-    """All of them, once for each law and values of its parameters.
-
-    Raises
-    ------
-    LawError
-        The first that fails.
-    """
+    """All of them, once for each law and values of its parameters. Raises LawError: the first that fails."""
     _checked(law, tuple(values.items()))

@@ -23,13 +23,7 @@ SHORT = {
 
 
 def law_of(kind: str, formula: str, units: Mapping[str, str]) -> Law:
-    """The law of a formula, whose parameters have these units.
-
-    Raises
-    ------
-    LawError
-        If it is none.
-    """
+    """The law of a formula, whose parameters have these units. Raises LawError if it is none."""
     return _made(kind, formula, tuple(units.items()))
 
 

@@ -17,10 +17,7 @@ def text_of_rate(objective: Objective) -> str:
     """The text of an objective's rate, as ``rate``: of a joint, None for one that is of the whole mechanism, and of direction
     and speed of the drive's body; it reads the other rates. A root mean square integrates its square.
 
-    Raises
-    ------
-    LawError
-        If it has more in it than arithmetic.
+    Raises LawError if it has more in it than arithmetic.
     """
     assert objective.rate is not None
     call = f"own_rate({', '.join(_ROWS[name] for name in arguments(objective.rate))})"

@@ -57,10 +57,7 @@ def _source(function: Callable[..., object]) -> str:
 def written(function: Callable[..., object], name: str, title: str) -> list[str]:
     """Texts of a function, called `name`, and of those it calls, which come first.
 
-    Raises
-    ------
-    LawError
-        If it has more in it than arithmetic.
+    Raises LawError if it has more in it than arithmetic.
     """
     try:
         return _Writer(title).function(function, name)

@@ -94,12 +94,9 @@ def boundary(
     resumes : bool
         The same block goes on from what this one saved when it was stopped early.
 
-    Raises
-    ------
-    SystemExit
-        On all other ranks instead of the block, and on root unless all went well. The exit code is the same on every rank:
-        0, or that of a `sys.exit` in the block; 1 after a program error, a refused write or want of memory, reported once;
-        2 after an `InputError`; 3 after `Stopped`.
+    Raises SystemExit on all other ranks instead of the block, and on root unless all went well. The exit code is the same on
+    every rank: 0, or that of a `sys.exit` in the block; 1 after a program error, a refused write or want of memory, reported
+    once; 2 after an `InputError`; 3 after `Stopped`.
     """
     launcher.pin_threads()
     with contextlib.ExitStack() as stack:
@@ -216,13 +213,7 @@ def alone() -> Ranks:
 
 
 def describe_mpi() -> str:
-    """Name and version of the MPI library that would be used; does not start it.
-
-    Raises
-    ------
-    InputError
-        If none can be loaded.
-    """
+    """Name and version of the MPI library that would be used; does not start it. Raises InputError if none can be loaded."""
     lines = _load_mpi().Get_library_version().strip("\0\n ").splitlines()
     return " ".join(lines[0].replace("Version:", "").split())
 

@@ -61,12 +61,8 @@ def run_points(
     structured ndarray
         One record a sample in ascending order, whoever made it; empty unless `keep`.
 
-    Raises
-    ------
-    Stopped
-        If requested to end early; `on_records` got everything that was finished, `save` may be due.
-    RankFailed
-        If another rank failed; likewise.
+    Raises Stopped if requested to end early; `on_records` got everything that was finished, `save` may be due. Raises
+    RankFailed if another rank failed; likewise.
     """
     earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
     progress = Progress("", style="quiet") if progress is None else progress

@@ -80,10 +80,7 @@ class Ranks:
     def stop_requested(self) -> bool:
         """Whether a signal on any rank or the time limit requests an early end; for root.
 
-        Raises
-        ------
-        RankFailed
-            If another rank has failed.
+        Raises RankFailed if another rank has failed.
         """
         while (message := self.mail.poll()) is not None:
             self.heed(message)
@@ -118,12 +115,7 @@ class Ranks:
         payload : object
             Travels to every rank.
 
-        Raises
-        ------
-        Stopped
-            If requested to end early.
-        RankFailed
-            If another rank failed.
+        Raises Stopped if requested to end early. Raises RankFailed if another rank failed.
         """
         with self.timed(name) as spent:
             self.raise_if_stopped()

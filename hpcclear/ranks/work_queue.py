@@ -79,10 +79,7 @@ class WorkQueue:
     def work(self, seconds: float = QUANTUM) -> np.ndarray:
         """Let the worker advance; return the records it finished.
 
-        Raises
-        ------
-        RuntimeError
-            If the worker returns a sample that it was not given, or had returned before.
+        Raises RuntimeError if the worker returns a sample that it was not given, or had returned before.
         """
         started = self._clock()
         self._inside = True

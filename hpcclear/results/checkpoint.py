@@ -43,12 +43,8 @@ def unfinished(directory: Path) -> bool:
 def discard(directory: Path) -> None:
     """Remove what a `Checkpoint` wrote in a directory, and the directory unless more is in it.
 
-    The mark of `Checkpoint.finish` goes last: half of what was there is never taken for all of it.
-
-    Raises
-    ------
-    InputError, StorageError
-        The disk refuses.
+    The mark of `Checkpoint.finish` goes last: half of what was there is never taken for all of it. Raises InputError,
+    StorageError: the disk refuses.
     """
     try:
         if directory.is_symlink() or not directory.is_dir():
@@ -106,12 +102,8 @@ class Checkpoint:
     problems : list of str
         What was found on disk and could not be used, a sentence each.
 
-    Raises
-    ------
-    InputError
-        The directory holds another run's results, is a link, or cannot be written to.
-    StorageError
-        The disk fails.
+    Raises InputError: the directory holds another run's results, is a link, or cannot be written to. Raises StorageError: the
+    disk fails.
     """
 
     def __init__(
@@ -269,10 +261,7 @@ class Checkpoint:
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
         """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
 
-        Raises
-        ------
-        InputError
-            The file is another run's.
+        Raises InputError: the file is another run's.
         """
         with self._watch.running():
             path = self._stage_path(name)

@@ -31,10 +31,8 @@ def write_crate(directory: Path, notify: Callable[[str], object] = lambda text: 
     Path
         Of the file.
 
-    Raises
-    ------
-    InputError
-        There is no result file, all are damaged, or a file of that name says something else: its user may have added to it.
+    Raises InputError: there is no result file, all are damaged, or a file of that name says something else: its user may have
+    added to it.
     """
     read = dict(dataset.each_in(directory))
     found = {path: one for path, one in read.items() if isinstance(one, Results)}

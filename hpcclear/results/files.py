@@ -35,10 +35,7 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     mark : bytes
         What every file of the kind to be written holds near one of its ends; empty: none may be there.
 
-    Raises
-    ------
-    InputError
-        Something of somebody else's is in the way.
+    Raises InputError: something of somebody else's is in the way.
     """
     try:
         about = path.lstat()
@@ -82,16 +79,10 @@ def _is_marked(path: Path, mark: bytes) -> bool:
 def write_bytes(path: Path, content: Buffer, mark: bytes = b"") -> None:
     """Put `content` at `path` whole: temporary name beside it, fsync, rename, fsync of the parent.
 
-    A symbolic link at `path` is replaced, never followed; a file is, if it holds `mark` near an end
-    (`refuse_foreign`). The temporary is removed when anything goes wrong.
-
-    Raises
-    ------
-    InputError
-        The place cannot be written to (permission, missing directory, directory in the way), or holds
-        what this program did not write.
-    StorageError
-        The disk is full or fails, or a file size limit is met.
+    A symbolic link at `path` is replaced, never followed; a file is, if it holds `mark` near an end (`refuse_foreign`). The
+    temporary is removed when anything goes wrong. Raises InputError: the place cannot be written to (permission, missing
+    directory, directory in the way), or holds what this program did not write. Raises StorageError: the disk is full or
+    fails, or a file size limit is met.
     """
     refuse_foreign(path, mark)
     try:
@@ -174,12 +165,7 @@ def fsync_directory(descriptor: int) -> None:
 def probe(path: Path, mark: bytes = b"") -> None:
     """Refuse a place that `path` could not be written to, before hours are spent computing for it.
 
-    `mark`: of the kind of file, as for `write_bytes`.
-
-    Raises
-    ------
-    InputError, StorageError
-        As `write_bytes`.
+    `mark`: of the kind of file, as for `write_bytes`. Raises InputError, StorageError as `write_bytes`.
     """
     refuse_foreign(path, mark)
     trial = path.with_name(f".hpcclear-{secrets.token_hex(8)}.tmp")

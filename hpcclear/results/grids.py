@@ -19,10 +19,7 @@ SHAPE = "map_shape"
 def grid(content: xr.Dataset) -> xr.Dataset:
     """A map's cells with its entries as coordinates, in place of sample numbers.
 
-    Raises
-    ------
-    InputError
-        If the dataset is no map.
+    Raises InputError if the dataset is no map.
     """
     return cells_of(Results.of(content)).to_xarray()
 

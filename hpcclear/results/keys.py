@@ -29,10 +29,7 @@ def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
     place : Path
         For the message.
 
-    Raises
-    ------
-    InputError
-        The keys differ; the message lists where.
+    Raises InputError: the keys differ; the message lists where.
     """
     found = key_of(content)
     differ = [name for name in sorted({*found, *key}) if found.get(name) != key.get(name)]

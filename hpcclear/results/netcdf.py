@@ -41,10 +41,7 @@ _ATTRIBUTE_LIMIT = (
 def read_bytes(path: Path) -> bytes:
     """The sealed content of `path`, seal verified and removed.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no regular file, was never sealed, or changed since.
+    Raises InputError: the file cannot be read, is no regular file, was never sealed, or changed since.
     """
 
     def bad(reason: str, remedy: str) -> InputError:
@@ -106,13 +103,9 @@ def load(path: Path) -> Results:
 def encode(content: Results) -> bytes:
     """Results as the bytes of a NetCDF-4 file; equal content gives equal bytes.
 
-    Variables are numbers or text; coordinates are one-dimensional and named as their dimension.
-    Floating-point data variables carry ``_FillValue = NaN``, coordinates and integers carry none.
-
-    Raises
-    ------
-    ValueError
-        A type or a coordinate that the file cannot hold.
+    Variables are numbers or text; coordinates are one-dimensional and named as their dimension. Floating-point data variables
+    carry ``_FillValue = NaN``, coordinates and integers carry none. Raises ValueError: a type or a coordinate that the file
+    cannot hold.
     """
     return _image(content).getvalue()
 
@@ -178,10 +171,7 @@ def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str
 def decode(content: bytes) -> Results:
     """What the bytes of `encode` hold; nothing outside these bytes is touched or evaluated.
 
-    Raises
-    ------
-    ValueError, OSError, RuntimeError, KeyError, TypeError, OverflowError
-        The bytes are not of this form.
+    Raises ValueError, OSError, RuntimeError, KeyError, TypeError, OverflowError: the bytes are not of this form.
     """
     coordinates, data = {}, {}
     with h5py.File(io.BytesIO(content), "r") as file:

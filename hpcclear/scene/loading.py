@@ -92,12 +92,8 @@ def load_scene(
 def scene_of_text(text: str, name: str) -> Scene:
     """Return the scene of a text that a result file carries, with what was set or changed noted at its head.
 
-    No file is opened, whatever the text names: it may be somebody else's. Python text in it is run in a `trusting` block only.
-
-    Raises
-    ------
-    InputError
-        As `load_scene`, or if values are in a file, or nobody has said that Python text in it may be run.
+    No file is opened, whatever the text names: it may be somebody else's. Python text in it is run in a `trusting` block
+    only. Raises InputError as `load_scene`, or if values are in a file, or nobody has said that Python text in it may be run.
     """
     content = parse(text, name)
     notes = list(
@@ -151,10 +147,7 @@ def _read(
 def parse(text: str, name: str) -> dict[str, object]:
     """The tables of a TOML text, whatever it holds; `name` says in errors where it stands.
 
-    Raises
-    ------
-    InputError
-        If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
+    Raises InputError if it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
     """
     where = "scene file", name
     if len(text) > LARGEST_FILE:

@@ -199,13 +199,7 @@ class Accumulator:
         self._missing[number] -= records.size
 
     def result(self) -> Summary:
-        """Statistics of the whole design.
-
-        Raises
-        ------
-        RuntimeError
-            If samples are missing.
-        """
+        """Statistics of the whole design. Raises RuntimeError if samples are missing."""
         if not self.complete:
             raise RuntimeError("statistics were requested before every sample has finished")
         return self._whole
@@ -244,10 +238,7 @@ class Accumulator:
     def restore(self, data: Mapping[str, ArrayLike]) -> None:
         """Go on from a `state` of an accumulator of the same layout; this one is new.
 
-        Raises
-        ------
-        ValueError
-            If the layout differs.
+        Raises ValueError if the layout differs.
         """
         arrays = {name: np.asarray(values) for name, values in data.items()}
         *layout, self._next = arrays["layout"].tolist()

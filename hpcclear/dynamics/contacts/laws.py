@@ -50,13 +50,7 @@ class InLanes:
 
 @cache
 def in_lanes(law: Law) -> InLanes:
-    """A law ready to be written out.
-
-    Raises
-    ------
-    LawError
-        If a function has more in it than arithmetic.
-    """
+    """A law ready to be written out. Raises LawError if a function has more in it than arithmetic."""
     facts = tuple(one for one in ("latched", "bristled") if getattr(law, one, False))
     return InLanes(text_of(law), law.name, facts)
 

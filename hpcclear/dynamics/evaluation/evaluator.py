@@ -41,10 +41,7 @@ LEAST_LANES = 16
 def default_lanes() -> int:
     """Lanes of an ensemble on this processor, or as many as ``HPCCLEAR_LANES`` says; no result depends on them.
 
-    Raises
-    ------
-    InputError
-        If that is not a whole number from 1 to 1024.
+    Raises InputError if that is not a whole number from 1 to 1024.
     """
     asked = os.environ.get("HPCCLEAR_LANES", "")
     if not asked:
@@ -118,10 +115,7 @@ class Evaluator:
     recorder : Lanes, optional
         By which samples are simulated, instead of lanes of its own.
 
-    Raises
-    ------
-    InputError
-        If the scene requires what the kernel cannot do.
+    Raises InputError if the scene requires what the kernel cannot do.
     """
 
     def __init__(

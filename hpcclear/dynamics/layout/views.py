@@ -52,13 +52,7 @@ def _entry(entry: int) -> Column:
 
 
 class View:
-    """Rows of numbers, shape (..., `size`).
-
-    Raises
-    ------
-    ValueError
-        If the rows have another length.
-    """
+    """Rows of numbers, shape (..., `size`). Raises ValueError if the rows have another length."""
 
     size: int
 

@@ -65,12 +65,8 @@ def _degrees(angle: float) -> str:
 def assemble(mechanism: Mechanism) -> Assembly:
     """Close all loops at time 0, journals centred or at their `start_eccentricity`, with the velocities of ideal joints.
 
-    The least change is that of the bodies' own axes (`uncentred`), so that mass centres move nothing.
-
-    Raises
-    ------
-    InputError
-        If a loop cannot close, a joint is held twice, or the mechanism stands in a dead centre: the joint is named.
+    The least change is that of the bodies' own axes (`uncentred`), so that mass centres move nothing. Raises InputError if a
+    loop cannot close, a joint is held twice, or the mechanism stands in a dead centre: the joint is named.
     """
     bare = uncentred(mechanism)
     loops = Loops(bare, closed=True)
@@ -291,10 +287,7 @@ def rough_pose(loops: Loops) -> Array:
 def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> float:
     """Smallest singular value of the constraints' Jacobian (rows, n), rows scaled to 1, of those that `rows` picks.
 
-    Raises
-    ------
-    InputError
-        If they depend on one another.
+    Raises InputError if they depend on one another.
     """
     scaled = (jacobian * loops.scales)[rows]
     smallest = float(_smallest(scaled, loops.size))

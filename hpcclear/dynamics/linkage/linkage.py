@@ -36,10 +36,7 @@ class Linkage:
     places : tuple of int
         Of the contacts among the kernel's, one behind the other.
 
-    Raises
-    ------
-    InputError
-        If it needs more parameters than the kernel holds.
+    Raises InputError if it needs more parameters than the kernel holds.
     """
 
     def __init__(

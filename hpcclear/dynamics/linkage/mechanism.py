@@ -29,10 +29,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 class Mechanism:
     """Bodies, ground points, joints, drives and loads that make one mechanism.
 
-    Raises
-    ------
-    InputError
-        If they do not: the joint, body, drive or load is named.
+    Raises InputError if they do not: the joint, body, drive or load is named.
     """
 
     bodies: tuple[Body, ...]

@@ -68,10 +68,8 @@ def prescribed_motion(
     """Motion and reactions at instants (t,), s, which rise from 0; `curves`: tabulated loads by name, each as a function of the
     angle (t,), rad, or time (t,), s, that it goes by; 1 for those left out.
 
-    Raises
-    ------
-    InputError
-        If a joint has clearance or the drives leave something free, and where the mechanism comes to a dead centre.
+    Raises InputError if a joint has clearance or the drives leave something free, and where the mechanism comes to a dead
+    centre.
     """
     if mechanism.clearances or freedom(mechanism):
         raise InputError(
@@ -201,10 +199,7 @@ def pose_at(assembly: Assembly, passage: Passage, node: WalkPose) -> Assembly:
 def passed_through(assembly: Assembly, times: Array) -> Array:
     """Coordinates and velocities (t, 2, n) at instants (t,), s, that rise from 0.
 
-    Raises
-    ------
-    InputError
-        Where the mechanism comes to a dead centre.
+    Raises InputError where the mechanism comes to a dead centre.
     """
     passage = _passed(assembly, times)
     shown, filled = _beside(passage, times)

@@ -38,13 +38,7 @@ NOT_OF_MOTION = (".out_of_round.", ".start_eccentricity.")
 
 @lru_cache(maxsize=16)
 def linkage_of(scene: Scene) -> Linkage:
-    """The structure of a scene's linkage.
-
-    Raises
-    ------
-    InputError
-        If the tables make no mechanism, or its drives no period.
-    """
+    """The structure of a scene's linkage. Raises InputError if the tables make no mechanism, or its drives no period."""
     zeros = [path for path in _may_vary(scene) if scene.number(path) == 0.0]
     shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
     mechanism = mechanism_of(shown.linkage)
@@ -246,10 +240,7 @@ def driven_length(mechanism: Mechanism) -> Array:
 def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
     """The status of a scene whose own linkage cannot turn, and what to say; None for one that can, or is not to be judged.
 
-    Raises
-    ------
-    InputError
-        If it cannot be put together.
+    Raises InputError if it cannot be put together.
     """
     return refused(_walk_of(scene))
 

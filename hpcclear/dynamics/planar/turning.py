@@ -87,10 +87,7 @@ Walk = tuple[Assembly, Passage]
 def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:
     """The walk of a linkage's twin through so many revolutions, put together; None where it is not to be judged.
 
-    Raises
-    ------
-    InputError
-        If a mechanism without clearance cannot be put together.
+    Raises InputError if a mechanism without clearance cannot be put together.
     """
     twin = twin_of(mechanism)
     if twin is None:

@@ -61,13 +61,7 @@ def _share_that_wears(scene: Scene, get: Numbers, joint: str) -> Array:
 
 
 def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
-    """First row of a joint's waves among `layout.WAVE_ROWS`, and how many.
-
-    Raises
-    ------
-    InputError
-        If there are more than rows.
-    """
+    """First row of a joint's waves among `layout.WAVE_ROWS`, and how many. Raises InputError if there are more than rows."""
     rows = 2 * sum(scene.waves().values())
     first = rows * _place(scene, joint)
     if first + rows > at.WAVE_ROWS:
@@ -109,10 +103,7 @@ def _place(scene: Scene, joint: str) -> int:
 def with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
     """Parameters (m, PARAMETERS) with what films are solved for once a bearing.
 
-    Raises
-    ------
-    InputError
-        If samples differ in length over diameter of such a film.
+    Raises InputError if samples differ in length over diameter of such a film.
     """
     rows = np.zeros((len(p), further_rows(scene)))
     rows[:, : p.shape[1]] = p

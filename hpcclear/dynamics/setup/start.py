@@ -38,12 +38,8 @@ def start_states(
     """Start of each sample, of parameters (samples, PARAMETERS) and the points they were made from.
 
     Put together with journals centred, or where ``start_eccentricity`` puts them, and velocities of ideal joints. Unless
-    `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`).
-
-    Raises
-    ------
-    InputError
-        If the scene itself does not close.
+    `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`). Raises InputError if the
+    scene itself does not close.
     """
     trees = linkage_of(scene).forest
     first = scene.bristles  # which begin undeflected

@@ -46,10 +46,7 @@ class Lanes:
     kept : int
         How many samples are recorded.
 
-    Raises
-    ------
-    ValueError
-        If the problem's coordinates do not fit the stepper.
+    Raises ValueError if the problem's coordinates do not fit the stepper.
     """
 
     def __init__(
@@ -194,13 +191,8 @@ class Lanes:
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), m starts, labels (m,).
 
-        To be called when everything finished has been collected: lanes keep their own copy of what they
-        run, so the queue is rebuilt from what still waits.
-
-        Raises
-        ------
-        ValueError
-            If a row of parameters has another length than the kernel's.
+        To be called when everything finished has been collected: lanes keep their own copy of what they run, so the queue is
+        rebuilt from what still waits. Raises ValueError if a row of parameters has another length than the kernel's.
         """
         par = Parameters(par).rows
         if self.pending == 0:
@@ -255,10 +247,7 @@ class Lanes:
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running.
 
-        Raises
-        ------
-        RuntimeError
-            The record is full: what comes next would be written beyond it.
+        Raises RuntimeError: the record is full: what comes next would be written beyond it.
         """
         if self.record_full:
             raise RuntimeError("the record is full; take it first")

@@ -40,10 +40,7 @@ IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 class Problem:
     """Everything that is common to the samples of a run.
 
-    Raises
-    ------
-    ValueError
-        If coordinates or tolerances do not fit the kernel.
+    Raises ValueError if coordinates or tolerances do not fit the kernel.
     """
 
     linkage: Linkage

@@ -104,11 +104,8 @@ class RobustObjective:
         Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
         array (count,).
 
-    Raises
-    ------
-    InputError
-        A random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
-        support that leaves the surrogate's domain.
+    Raises InputError: a random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
+    support that leaves the surrogate's domain.
     """
 
     def __init__(
@@ -156,10 +153,7 @@ class RobustObjective:
     def sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
         """The surrogate at given draws of the random inputs, (s,) each, or (n, s): ``(n, s)``.
 
-        Raises
-        ------
-        InputError
-            As on a call.
+        Raises InputError as on a call.
         """
         rows = {name: np.atleast_2d(draws[name]) for name in self._wiring.random}
         return self._sampled(self._checked(designs), rows)

@@ -105,10 +105,7 @@ def design_intervals(
     -------
     IntervalDesign
 
-    Raises
-    ------
-    InputError
-        There would be too few points for a standard error.
+    Raises InputError: there would be too few points for a standard error.
     """
     limits, gaps = np.asarray(bounds, float), np.asarray(clearances, float)
     needed = settings.needed(len(limits))
@@ -147,10 +144,7 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
     -------
     SensitivityHistory
 
-    Raises
-    ------
-    InputError
-        If no surface at all can be fitted.
+    Raises InputError if no surface at all can be fitted.
     """
     steps, n_variables, _ = design.intervals.shape
     shape = steps, len(design.clearances)

@@ -87,10 +87,7 @@ def fit_kriging(
     -------
     Kriging
 
-    Raises
-    ------
-    InputError
-        Points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
+    Raises InputError: points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     from threadpoolctl import threadpool_limits
 

@@ -21,10 +21,7 @@ def checked_samples(
 ) -> tuple[tuple[str, ...], Booleans]:
     """Return the inputs' names (default x1, x2, ...), and which of the samples (n,) count; NaN values are failed samples.
 
-    Raises
-    ------
-    InputError
-        Points outside the bounds, or fewer valid samples than needed.
+    Raises InputError: points outside the bounds, or fewer valid samples than needed.
     """
     labels = tuple(names or (f"x{k + 1}" for k in range(points.shape[1])))
     inside(points, labels, *bounds.T)
@@ -44,10 +41,7 @@ def inside(
 ) -> np.ndarray:
     """Points ``(n, d)`` as floats, after checking that none lies outside the box.
 
-    Raises
-    ------
-    InputError
-        Naming the first variable and value outside.
+    Raises InputError naming the first variable and value outside.
     """
     points = np.asarray(points, dtype=np.float64)
     slack = 8 * np.finfo(float).eps * np.maximum(abs(lower), abs(upper))

@@ -58,10 +58,7 @@ class Piecewise:
     def locate(self, points: np.ndarray) -> np.ndarray:
         """Index of the box that each of ``(n, d)`` points is in; a border belongs to the upper box.
 
-        Raises
-        ------
-        InputError
-            A point lies outside the domain.
+        Raises InputError: a point lies outside the domain.
         """
         points = inside(points, self.names, self.lower, self.upper)
         points = np.clip(points, self.lower, self.upper)  # round-off beyond the outer border

@@ -65,10 +65,8 @@ class RegressionMethod:
     ) -> "Regression":
         """Fit a new regressor.
 
-        Raises
-        ------
-        InputError
-            As `hpcclear.statistics.surrogate.leaf.checked_samples`, or the regressor failed; the message says in what.
+        Raises InputError as `hpcclear.statistics.surrogate.leaf.checked_samples`, or the regressor failed; the message says
+        in what.
         """
         points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
         labels, valid = checked_samples(points, values, bounds, names, FOLDS)
@@ -79,10 +77,7 @@ class RegressionMethod:
     def restored(self, model: "Regression") -> "Regression":
         """Fit a model of a checkpoint again to its training points.
 
-        Raises
-        ------
-        InputError
-            The fit does not come out as it did.
+        Raises InputError: the fit does not come out as it did.
         """
         found = replace(model, source=self.source)
         if not np.array_equal(found.fitted, model.stored["fitted"]):
@@ -151,13 +146,7 @@ class Regression:
         return (points - self.lower) / (self.upper - self.lower)
 
     def predict(self, points: Array) -> Array:
-        """Values at points, (n, d) to (n,).
-
-        Raises
-        ------
-        InputError
-            A point outside the box, or the regressor failed.
-        """
+        """Values at points, (n, d) to (n,). Raises InputError: a point outside the box, or the regressor failed."""
         return self._predicted(self._model, inside(points, self.names, self.lower, self.upper))
 
     def _predicted(self, model: object, points: Array) -> Array:
@@ -209,10 +198,7 @@ class Regression:
 def made(source: object, label: str, seed: int) -> Any:
     """A regressor that is not fitted yet.
 
-    Raises
-    ------
-    InputError
-        It cannot be made without arguments, or has no `fit` or no `predict`.
+    Raises InputError: it cannot be made without arguments, or has no `fit` or no `predict`.
     """
     if isinstance(source, type) or not hasattr(source, "predict"):
         model = _called(source, label, seed)

@@ -72,11 +72,7 @@ def models_in(columns: Mapping[str, ArrayLike]) -> dict[str, Piecewise]:
     """The models of the variables of a file, by their inputs ("m2 m3 u2 I2_ratio C").
 
     Kriging models are ready to predict; others have their training points, and what stands in the file of their predictions.
-
-    Raises
-    ------
-    InputError
-        The rows are no models, or do not fit together.
+    Raises InputError: the rows are no models, or do not fit together.
     """
     arrays = {name: np.asarray(one) for name, one in columns.items()}
     found: dict[str, list[int]] = {}

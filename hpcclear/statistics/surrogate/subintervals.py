@@ -86,10 +86,7 @@ def fit_subintervals(
     -------
     Piecewise
 
-    Raises
-    ------
-    InputError
-        As the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
+    Raises InputError as the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
     pending = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng)
     done: list[tuple[Leaf, Accuracy, bool]] = []

@@ -125,10 +125,7 @@ def fit_until_accepted(
     searches : sequence of SurfaceSearch
         They know the surfaces afterwards.
 
-    Raises
-    ------
-    InputError
-        If no order can be fitted at any allowed sample, or fewer than two test values are finite.
+    Raises InputError if no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
     while going := {number: one for number, one in enumerate(searches) if not one.over}:
         values = evaluate({number: one.wanted() for number, one in going.items()})

@@ -50,10 +50,7 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     float
         Mean square error at points that had no part in the choice.
 
-    Raises
-    ------
-    InputError
-        Too few points to choose by.
+    Raises InputError: too few points to choose by.
     """
     from threadpoolctl import threadpool_limits
 

@@ -32,12 +32,8 @@ LARGEST_COUNT = 100_000
 class SoundingEvaluator:
     """Simulates points of one scene as a stream, with levels and half-widths; to be used like `Evaluator`.
 
-    Arguments as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
-
-    Raises
-    ------
-    InputError
-        If a band lies below the frequency of the drive, or too far above it.
+    Arguments as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`. Raises InputError if a band lies below the frequency
+    of the drive, or too far above it.
     """
 
     def __init__(
@@ -157,10 +153,7 @@ class Heard:
 def _instants_of_bands(scene: Scene) -> int:
     """Instants a revolution by which spectra of a sample reach as far as the scene's bands, and as far as its response's do.
 
-    Raises
-    ------
-    InputError
-        If a band lies below the frequency of the drive, or too far above it.
+    Raises InputError if a band lies below the frequency of the drive, or too far above it.
     """
     bands, period = np.array(scene.bands()), float(parameters(scene)[0, at.PERIOD])
     step = 10.0**0.05  # from the middle of a band to its ends

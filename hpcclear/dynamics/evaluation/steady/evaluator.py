@@ -97,10 +97,7 @@ class SteadyEvaluator:
         What is done to each design; by default `steady_mean` to the scene's ``numerics.target_error`` with
         ``numerics.target_revolutions``.
 
-    Raises
-    ------
-    InputError
-        If the scene requires what the kernel cannot do.
+    Raises InputError if the scene requires what the kernel cannot do.
     """
 
     def __init__(

@@ -40,10 +40,7 @@ class Tableau:
         Stage matrix (stages, stages), weights and error weights (stages,), first-same-as-last.
     source : str
 
-    Raises
-    ------
-    ValueError
-        If there are more than `STAGES` stages, or coefficients do not fit together.
+    Raises ValueError if there are more than `STAGES` stages, or coefficients do not fit together.
     """
 
     name: str
