@@ -90,11 +90,7 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
 def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int) -> Array:
     """Mean gaps of every revolution, shape (revolutions, samples, MAX_JOINTS), m; NaN from a failure on.
 
-    Parameters
-    ----------
-    lanes : Lanes
-        Empty, of a problem that averages one revolution without a transient.
-    par : ndarray, shape (samples, PARAMETERS)
+    The lanes are empty, of a problem that averages one revolution without a transient; `par` (samples, PARAMETERS).
     """
     count = len(par)
     gaps = np.full((revolutions, count, MAX_JOINTS), np.nan)

@@ -12,14 +12,7 @@ from hpcclear.dynamics.stepping.problem import Problem
 
 
 class CalledEquations:
-    """The equations of one design, for solvers that call them.
-
-    Parameters
-    ----------
-    par : ndarray, shape (PARAMETERS,)
-    start : Start
-        Of this design alone, as `hpcclear.dynamics.setup.start` makes it.
-    """
+    """The equations of one design, `par` (PARAMETERS,) and `hpcclear.dynamics.setup.start`, for solvers that call them."""
 
     def __init__(self, problem: Problem, par: Array, start: Start) -> None:
         n = problem.coordinates

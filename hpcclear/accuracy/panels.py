@@ -34,12 +34,7 @@ Simulate = Callable[[Scene, str, Profile, Ranks], tuple[Array, float]]
 class Panels:
     """Panels one after the other; what was kept is not measured again.
 
-    Parameters
-    ----------
-    notify : callable
-        Gets what is going on, a line at a time.
-    show : callable
-        Gets the dataset of all that is there whenever there is more of it.
+    `notify` gets what is going on, a line at a time; `show` the dataset of all that is there whenever there is more of it.
     """
 
     def __init__(

@@ -149,26 +149,11 @@ def measure(
     show: Callable[["Plan"], object] = lambda plan: None,
     progress_style: Style = "quiet",
 ) -> Plan:
-    """Measure what samples cost at the settings of the file and at those chosen for each error; on root.
+    """Measure what samples cost at the settings of the file and at those chosen for each target error; on root.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    ranks : Ranks
-    errors : tuple of float
-        Target errors of the ladder.
-    workers : int
-        Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
-        clock are slower together.
-    notify : callable
-        Gets what is measured, line by line, as it begins.
-    show : callable
-        Gets a first look at once, and the plan as far as it is measured after each of its rows but the last.
-    progress_style : {"auto", "bar", "log", "quiet"}
-        How the samples of a measurement are counted on standard error.
-
-    Raises InputError if the scene has no study.
+    `workers`: ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and clock
+    are slower together. `notify` gets what is measured, line by line, as it begins; `show` a first look at once, and the plan
+    as far as it is measured after each of its rows but the last. Raises InputError if the scene has no study.
     """
     study = scene.study
     few = scene

@@ -51,15 +51,7 @@ def measure(
 ) -> Variables:
     """Measure at the middle of the design space: (2 estimates, 2 moments, sizes), relative to the moment; NaN if not measured.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a study that has the case.
-    model : Leaf
-        In the inputs of the study's optimisation.
-    values : ndarray, shape (n,)
-    each : float
-        Of `simulate`.
+    The model is one in the inputs of the study's optimisation; `values` (n,) and `each` as of `simulate`.
     """
     problem = problem_of(scene, case, model)  # type: ignore[arg-type]
     _, design = middle_of(scene, case)

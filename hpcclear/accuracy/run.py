@@ -27,25 +27,11 @@ def measure(
     store: Checkpoint | None = None,
     show: Callable[[Results], object] = lambda content: None,
 ) -> Results:
-    """Measure what accuracy costs for a scene; on root.
+    """Measure what accuracy costs for a scene with a clearance joint at least; on root. Returns results of kind ``accuracy``.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a clearance joint at least.
-    notify : callable
-        Gets what is going on, a line at a time.
-    store : Checkpoint, optional
-        Where finished work is kept, and found again.
-    show : callable
-        Gets the dataset of all that is there whenever there is more of it.
-
-    Returns
-    -------
-    xarray.Dataset
-        Kind ``accuracy``.
-
-    Raises InputError if both joints are ideal: the objective is 0 then, whatever the settings.
+    `notify` gets what is going on, a line at a time; the store keeps finished work; `show` gets the dataset of all that is
+    there whenever there is more of it. Raises InputError if both joints are ideal: the objective is 0 then, whatever the
+    settings.
     """
     if scene.objective.joints:
         raise InputError(

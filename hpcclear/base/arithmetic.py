@@ -68,26 +68,11 @@ def check_count(word: str, given: int) -> None:
 def read(
     text: str, longest: int, words: Collection[str] = (), example: str = "m2 + m3"
 ) -> ast.expr:
-    """Read a formula.
+    """Read a formula: its names are no words, its numbers are finite, and no operation is left between two numbers.
 
-    Parameters
-    ----------
-    text : str
-        A number in Python's arithmetic: ``+ - * / **`` and, where there are `words`, calls of these, comparisons, ``and``,
-        ``or``, ``not`` and ``a if c else b``.
-    longest : int
-        Characters at most.
-    words : collection of str
-        What may be called; without any, conditions are refused too.
-    example : str
-        A formula, for messages.
-
-    Returns
-    -------
-    ast.expr
-        Its names are no words, its numbers are finite floats, and no operation is left between two numbers.
-
-    Raises FormulaError if it is none, is too long or nested too deeply, or a part of numbers alone has no finite value.
+    It is Python's arithmetic, ``+ - * / **``; where there are `words`, calls of these, comparisons, ``and``, ``or``, ``not``
+    and ``a if c else b`` besides. `example`: a formula, for messages. Raises FormulaError if it is none, is too long or
+    nested too deeply, or a part of numbers alone has no finite value.
     """
     if len(text) > longest:
         raise FormulaError(f"has more than {longest} characters", "Shorten it")

@@ -14,15 +14,7 @@ _OWN = os.path.abspath(__file__)
 
 
 def python(function: str, *words: str) -> list[str]:
-    """Return the command line of a process that calls a function of this package and exits with the number it returns.
-
-    Parameters
-    ----------
-    function : str
-        ``"module:function"``.
-    *words : str
-        Its arguments.
-    """
+    """Command line of a process that calls ``"module:function"`` of this package with words and exits with what that returns."""
     stricter = {"-E": sys.flags.ignore_environment, "-s": sys.flags.no_user_site}
     options = [option for option, chosen in stricter.items() if chosen]
     return [sys.executable, "-P", *options, _OWN, function, *words]

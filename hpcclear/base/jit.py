@@ -19,21 +19,10 @@ def narrow_vectors() -> None:
 
 
 class KernelFunction:
-    """A function of the kernel, for the lowering to write out.
+    """A function of the kernel, for the lowering to write out where another of the same `kind` ("lane" or "scalar") calls it.
 
-    Where Python or a function of Numba's calls it, Numba compiles it, and is loaded for that only: a fifth of the start of a
-    command.
-
-    Attributes
-    ----------
-    py_func : callable
-        The function as it was defined.
-    kind : {"lane", "scalar"}
-        Calls are written out in functions of the same kind.
-    targetoptions : dict
-        As those of `numba.njit`.
-    apart : bool
-        See `apart`.
+    Where Python or a function of Numba's calls it, Numba compiles it with `targetoptions`, and is loaded for that only: a
+    fifth of the start of a command. `py_func`: the function as it was defined; `apart`: see there.
     """
 
     def __init__(self, function: Callable[..., object], kind: str, **options: object) -> None:

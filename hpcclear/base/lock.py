@@ -124,14 +124,7 @@ def _job_is_over(job: str) -> bool:
 
 
 class Lock:
-    """A lock file in a directory; as a context, one in which no other run works there.
-
-    Parameters
-    ----------
-    directory : Path
-        The directory, which exists.
-    name : str
-        Name of the lock file in it.
+    """A lock file in a directory, which exists; as a context, one in which no other run works there.
 
     Raises InputError on entry: another run holds the lock, or the directory cannot be written to. Raises StorageError on
     entry: the disk fails.

@@ -50,18 +50,10 @@ class PartSize:
 def part(
     limits: tuple[float, float], cp: float, cpk: float, towards: str, inspected: bool
 ) -> PartSize:
-    """A normally distributed part by its capability.
+    """A part whose diameters, between two `limits` (m), are normally distributed, by its capability.
 
-    Parameters
-    ----------
-    limits : tuple
-        Smallest and largest diameter of the tolerance, m.
-    cp, cpk : float
-        Its capability, and that with its mean off the middle, no larger.
-    towards : str
-        "upper" or "lower": where the mean lies where `cpk` is less.
-    inspected : bool
-        Whether parts beyond these diameters are sorted out; else they are met up to `TAIL` standard deviations.
+    Where `cpk`, its capability with the mean off the middle, is less than `cp`, the mean lies `towards` "upper" or "lower".
+    Parts beyond the limits are sorted out where `inspected`; else they are met up to `TAIL` standard deviations.
     """
     lower, upper = limits
     deviation = (upper - lower) / (6.0 * cp)

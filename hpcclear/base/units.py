@@ -175,17 +175,9 @@ _EXAMPLES = {
 
 
 def to_si(text: str, target: str, decided: bool = False) -> float:
-    """Read a quantity such as ``"0.3 mm"`` as a float in `target`.
+    """Read a quantity such as ``"0.3 mm"`` as a float in the SI unit `target`, ``""`` for a number without one.
 
-    Parameters
-    ----------
-    text : str
-        A decimal number and a unit.
-    target : str
-        The SI unit expected, ``""`` for a number without one.
-    decided : bool
-        Whether it is known that a point stands before decimals, also in "3.000".
-
+    `decided`: it is known that a point stands before decimals, also in "3.000".
     Raises UnitError if the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
     """
     number, unit = quantity(text, target, decided)

@@ -88,16 +88,8 @@ def run_bifurcation(
     observation: Observation = Observation(),
     options: Options = DEFAULT_OPTIONS,
 ) -> Finished:
-    """Simulate a scene at each value of an entry on all ranks, and write what is observed of each revolution; on root.
-
-    Parameters
-    ----------
-    axis : str
-        ``PATH=LO:HI:N``.
-    output : Path
-        NetCDF file of kind ``bifurcation``.
-
-    Raises InputError, StorageError, Stopped, RankFailed.
+    """Simulate a scene at each value of an entry (``PATH=LO:HI:N``) on all ranks, and write what is observed of each
+    revolution; on root. Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     place = Place.of_file(output, options.fresh)

@@ -64,12 +64,7 @@ def _statistics(payload: Payload) -> None:
 def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> None:
     """Compile what a study of this scene needs, each part on a rank of its own if there are three.
 
-    Parameters
-    ----------
-    points : Points
-        Perhaps none; their columns are what counts.
-    style : str
-        How progress is shown.
+    Of the points, perhaps none, the columns are what counts; `style`: how progress is shown.
     """
     if style != "quiet":
         print(

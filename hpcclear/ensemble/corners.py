@@ -52,15 +52,7 @@ def corners(scene: Scene) -> Points:
 
 
 def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
-    """Return what the corners of a study's ranges come to.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    simulate : bool
-        Simulate those that make a mechanism, over two revolutions.
-    """
+    """What the corners of a study's ranges come to; with `simulate` those that make a mechanism run two revolutions."""
     points = corners(scene)
     plain = scene.with_({"study": None})
     moving = [

@@ -51,11 +51,6 @@ def run_effects(
 ) -> Finished:
     """Certify on all ranks which effects a scene can do without, and write it; on root.
 
-    Parameters
-    ----------
-    output : Path
-        NetCDF file of kind ``effects``.
-
     Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()

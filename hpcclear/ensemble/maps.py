@@ -116,16 +116,9 @@ def run_map(
     ranks: Ranks,
     options: Options = DEFAULT_OPTIONS,
 ) -> Finished:
-    """Judge every cell of a grid on all ranks and write it; on root.
+    """Judge every cell of a grid of one or two axes (``PATH=LO:HI:N``) on all ranks and write it, a sample a cell; on root.
 
-    Parameters
-    ----------
-    axes : tuple of str
-        ``PATH=LO:HI:N``, one or two.
-    output : Path
-        NetCDF file of kind ``samples``, a sample a cell; `grid` gives it back as a grid.
-
-    Raises InputError, StorageError, Stopped, RankFailed.
+    `grid` gives the file back as a grid. Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     place = Place.of_file(output, options.fresh)

@@ -36,20 +36,10 @@ class Repeated:
 
 
 def repeated(place: Path, count: int) -> Iterator[Repeated]:
-    """Simulate some of what files hold again, and compare.
+    """Simulate some of what a result file, or those of a directory, hold again, at most `count` samples spread over each, and
+    compare.
 
-    Parameters
-    ----------
-    place : Path
-        A result file, or a directory of them.
-    count : int
-        Samples of each file, at most; spread over it.
-
-    Yields
-    ------
-    Repeated
-        Of each file that was read, in order; of a damaged one in a directory, too.
-
+    Yields the outcome of each file that was read, in order; of a damaged one in a directory, too.
     Raises InputError: there is no result file; or `place` is a file that is damaged, or was made from no valid scene.
     """
     if not place.is_dir():

@@ -63,23 +63,10 @@ def run_sample(
     part: Part | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> Finished:
-    """Simulate a design on all ranks and write it; on root.
+    """Simulate a design, or a table of designs, on all ranks and write it; on root.
 
-    Parameters
-    ----------
-    output : Path
-        NetCDF file; NAME.timing.nc goes beside it, finished samples into a hidden directory until it is written.
-    table : Path, optional
-        CSV of designs.
-    part : Part, optional
-        Only these samples, into a file of their own beside `output`.
-
-    Returns
-    -------
-    Finished
-        The samples.
-
-    Raises InputError, StorageError, Stopped, RankFailed.
+    NAME.timing.nc goes beside the output, finished samples into a hidden directory until it is written; those of a `part`
+    into a file of their own. Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     points = design(scene, table)
@@ -150,13 +137,7 @@ def samples_of(
 def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:
     """Write the result of all parts of a design, as one run would have written it; the parts stay.
 
-    Parameters
-    ----------
-    points : Points
-        The whole design.
-    output : Path
-        The name that was given with each part.
-
+    `output`: the name that was given with each part.
     Raises InputError: parts are missing, damaged, or another run's. Raises StorageError: the disk refuses.
     """
     began = time.perf_counter()
@@ -219,29 +200,12 @@ def sample_points(
     maker: Maker | None = None,
     record: np.dtype | None = None,
 ) -> np.ndarray:
-    """Simulate a design on all ranks; call it on root.
+    """Simulate designs (SI) on all ranks; call it on root. Returns records (n,) in the points' order, numbered from 0.
 
-    Parameters
-    ----------
-    points : Points
-        Designs, SI.
-    checkpoint : Checkpoint, optional
-        Knows the samples finished earlier, and gets each new one; its names are those of `points`.
-        When this raises, everything finished is on disk, unless the disk refused it twice.
-    stage : str
-        Name for reports and timing.
-    first : int
-        Number of the first point in the checkpoint, for designs that come one after the other.
-    maker : function of a payload and the ranks, optional
-        Makes a rank's worker; by default `make_evaluator`.
-    record : dtype, optional
-        Type of the records; by default that of the scene (`hpcclear.scene.scene.record_of`).
-
-    Returns
-    -------
-    structured ndarray of `record`, shape (n,)
-        In the points' order; samples numbered from 0.
-
+    The checkpoint, whose names are those of `points`, knows the samples finished earlier, and gets each new one; its numbers
+    begin at `first`, for designs that come one after the other. When this raises, everything finished is on disk, unless the
+    disk refused it twice. `stage`: name for reports and timing; `maker` makes a rank's worker (`make_evaluator`), and `record`
+    is the type of its records (`hpcclear.scene.scene.record_of`).
     Raises Stopped, RankFailed, InputError as `hpcclear.ranks.leading.run_points`. Raises StorageError: the disk refuses.
     """
     sent = expanded(scene.study, points)  # rows of catalogues as the numbers they stand for

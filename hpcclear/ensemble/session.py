@@ -195,20 +195,9 @@ class Finished:
 class Session:
     """One run at its place, on root: a context in which no other run works there.
 
-    Parameters
-    ----------
-    key : mapping of str to str
-        What makes the run what it is (`hpcclear.ensemble.identity`).
-    notify : callable
-        Gets what was found on disk and could not be used, a sentence at a time.
-
-    Attributes
-    ----------
-    attributes : dict of str to str
-        Of every file of results: what made them, and the key; empty before `describe`.
-    joints : tuple of str
-    record : dtype
-        Labels of the joints, and type of the records of samples.
+    `key`: what makes the run what it is (`hpcclear.ensemble.identity`); `notify` gets what was found on disk and could not be
+    used, a sentence at a time. `attributes`: of every file of results, what made them, and the key; empty before `describe`;
+    `joints`, `record`: labels of the joints, and type of the records of samples.
     """
 
     def __init__(

@@ -36,32 +36,12 @@ def responses_of(
     checkpoint: Checkpoint | None = None,
     kept: str = "",
 ) -> Array:
-    """What each response comes to, NaN where `evaluate` returns it; call it on root.
+    """What each response comes to (variants, copies, *shape), NaN where `evaluate` returns it; call it on root.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its study is left out; the objective is its own.
-    variants : sequence of mapping
-        Entries that are other ones, by their paths.
-    evaluate : callable
-        A function of a module, of a variant and its response: values of `shape`.
-    shape : tuple of int
-    stage : str
-        Name for reports and timing.
-    copies : int
-        Starts of each variant; all but the first are perturbed.
-    together : int
-        Responses in a batch, which share the memory of a rank; results do not depend on it.
-    checkpoint : Checkpoint, optional
-        Has those that were finished earlier, and gets each new one.
-    kept : str
-        Name of a stage of it, as `Checkpoint.save_stage`; by default `stage`.
-
-    Returns
-    -------
-    ndarray, shape (variants, copies, *shape)
-
+    A variant is what is other in the scene, by paths; the study is left out. `evaluate`: a function of a module, of a variant
+    and its response, which returns values of `shape`. `copies`: starts of each variant; all but the first are perturbed.
+    `together`: responses in a batch, which share the memory of a rank; results do not depend on it. The checkpoint has those
+    that were finished earlier, and gets each new one as its stage `kept`, by default `stage`, the name for reports and timing.
     Raises Stopped, RankFailed, InputError. Raises StorageError: the disk refuses a checkpoint.
     """
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])

@@ -57,25 +57,10 @@ def run_statistics(
     raw: Path | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> Finished:
-    """Simulate Monte Carlo samples on all ranks and write their statistics; on root.
+    """Simulate Monte Carlo samples of a study on all ranks and write their statistics; on root.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a study that samples by Monte Carlo.
-    output : Path
-        NetCDF file of kind ``statistics``; NAME.timing.nc goes beside it, what is unfinished into a hidden directory.
-    samples : int, optional
-        Number of samples, the study's by default.
-    raw : Path, optional
-        Directory for the samples themselves, a file of kind ``samples`` for every 4096.
-
-    Returns
-    -------
-    Finished
-        The statistics.
-
-    Raises InputError, StorageError, Stopped, RankFailed.
+    NAME.timing.nc goes beside the output, what is unfinished into a hidden directory, the samples themselves to the directory
+    `raw`, if there is one, a file of kind ``samples`` for every 4096. Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     if scene.study is None or scene.study.method != "monte-carlo":
@@ -140,15 +125,7 @@ def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
 
 
 class _Streaming:
-    """Simulates what is left of a design, with the statistics so far on disk every few seconds.
-
-    Parameters
-    ----------
-    session : Session
-        Entered.
-    raw : Path or None
-        Directory for the samples themselves.
-    """
+    """Simulates what is left of a design, with the statistics so far on disk every few seconds; the session is entered."""
 
     def __init__(
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None

@@ -60,16 +60,10 @@ Simulate = Callable[[Scene, Points], Records]
 
 
 class Drawn:
-    """The points at which all variants are compared, replicate by replicate.
+    """The points at which all variants are compared, replicate by replicate of `size` points.
 
     With a study, designs all over its variables and, about each, its random inputs; without, clearances about the scene's.
-
-    Attributes
-    ----------
-    size : int
-        Points of a replicate.
-    scattered : bool
-        Whether they scatter about one design.
+    `scattered`: they scatter about one design.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -123,16 +117,9 @@ class Wanted(NamedTuple):
 
 
 class Trial:
-    """A scene, the effects that it might do without, and how variants of it are simulated.
+    """A scene, the effects that it might do without (`switches`), and how variants of it are simulated.
 
-    Attributes
-    ----------
-    switches : tuple of Switch
-        Effects that are tried.
-    kept : dict of str to str
-        Effects that cannot be off by themselves, by name, and why.
-
-    Raises InputError: the scene has no effect that could be off.
+    `kept`: effects that cannot be off by themselves, by name, and why. Raises InputError: no effect could be off.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -258,18 +258,9 @@ def run_wear(
     options: Options = DEFAULT_OPTIONS,
     timing: Path | None = None,
 ) -> Finished:
-    """Simulate the service lives of a scene on all ranks and write them; on root.
+    """Simulate the service lives of a scene with a worn joint on all ranks and write them; on root.
 
-    Parameters
-    ----------
-    scene : Scene
-        With ``[wear]`` and a worn joint.
-    output : Path
-        NetCDF file of kind ``wear``.
-    timing : Path, optional
-        Where the times go, beside the output by default.
-
-    Raises InputError, StorageError, Stopped, RankFailed.
+    `timing`: where the times go, beside the output by default. Raises InputError, StorageError, Stopped, RankFailed.
     """
     began = time.perf_counter()
     check_worn(scene)

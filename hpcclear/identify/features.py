@@ -23,20 +23,11 @@ SUMS = ("acceleration", "frame_force")
 
 @dataclass(frozen=True)
 class Layout:
-    """Which features a signal has.
+    """Which features a signal has: harmonics of `orders`, with phases where it is `synchronised`, and third octaves above
+    `LOW`.
 
-    Attributes
-    ----------
-    name : str
-        The signal.
-    orders : tuple of int
-        Harmonics of their own.
-    bands : tuple of (int, int)
-        First and last order of each third octave above `LOW`.
-    synchronised : bool
-        Whether harmonics have phases.
-    noise : float, optional
-        Standard deviation of the sensor's noise in a single harmonic; with it the scatter between revolutions is a feature.
+    `bands`: first and last order of each; `noise`: standard deviation of the sensor's noise in a single harmonic, with which
+    the scatter between revolutions is a feature.
     """
 
     name: str

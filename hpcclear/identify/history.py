@@ -45,19 +45,11 @@ def history(
     times: Array, particles: Array, limit: float | None, rng: np.random.Generator,
     explained: Booleans | None = None,
 ) -> History | None:  # fmt: skip
-    """Return the rate of growth, by least squares through posteriors of several dates; None for fewer than two dates.
+    """Rate of growth, by least squares through posteriors (m, n, unknowns) at times (m,), s; None for fewer than two dates.
 
-    Parameters
-    ----------
-    times : ndarray, shape (m,)
-        s.
-    particles : ndarray, shape (m, n, unknowns)
-        Posteriors at each date. They are paired by chance: what the dates have in common makes the interval wider than need be.
-    limit : float, optional
-        SI; without it times are NaN.
-    rng : Generator
-    explained : ndarray of bool, shape (m,), optional
-        Records that count: the posterior of a record that the model does not explain is not that of the machine.
+    They are paired by chance: what the dates have in common makes the interval wider than need be. `limit`: SI; without it
+    times are NaN. `explained` (m,): records that count, since the posterior of a record that the model does not explain is not
+    that of the machine.
     """
     last = times[-1]
     if explained is not None:

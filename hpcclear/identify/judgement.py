@@ -56,19 +56,10 @@ class Prepared:
 class Judgement:
     """What one measurement says.
 
-    Attributes
-    ----------
-    particles : ndarray, shape (n, inputs)
-        Of the posterior, SI, widened about the median as the intervals are.
-    interval : ndarray, shape (3, unknowns)
-        Lower end, median and upper end, SI.
-    doubt : float
-        Standard score of the fit of all features.
-    explained : bool
-    worst : int
-        Feature that fits least.
-    measured, predicted, deviation : ndarray, shape (p,)
-        Features; mean and standard deviation of those of machines with the same summaries.
+    `particles` (n, inputs): of the posterior, SI, widened about the median as the intervals are; `interval` (3, unknowns):
+    lower end, median and upper end, SI; `doubt`: standard score of the fit of all features, the `worst` of which fits least;
+    `measured`, `predicted`, `deviation` (p,): features; mean and standard deviation of those of machines with the same
+    summaries.
     """
 
     particles: Array

@@ -28,25 +28,11 @@ def write_made(
     scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
     samples: int = 512, seed: int = 0, response: xr.Dataset | Results | None = None,
 ) -> None:  # fmt: skip
-    """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
+    """Simulate a scene and write what a sensor would record over the crank angle, after the transient, as a CSV table.
 
-    Parameters
-    ----------
-    scene : Scene
-        The machine.
-    path : path
-        CSV table to write.
-    names : sequence of str
-        Signals.
-    noise : float
-        Standard deviation of white noise in each sample, over the RMS of the signal about its mean; counts have none.
-    revolutions, samples : int
-        Revolutions of the drive, and samples of each.
-    seed : int
-    response : xarray.Dataset, optional
-        Of the scene, with one revolution more than is written; by default it is simulated here.
-
-    Raises InputError: the simulation fails.
+    `noise`: standard deviation of white noise in each sample, over the RMS of the signal about its mean; counts have none.
+    `samples`: of each revolution. `response`: of the scene, with one revolution more than is written, in place of a
+    simulation. Raises InputError: the simulation fails.
     """
     if response is None:
         longer = {"numerics.averaged_revolutions": revolutions + 1}

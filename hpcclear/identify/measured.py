@@ -32,18 +32,8 @@ PAIRS = 180
 class Measured:
     """One signal of one table.
 
-    Attributes
-    ----------
-    name : str
-    spectrum : Spectrum
-    synchronised : bool
-        Whether the crank angle was recorded, so that phases are known.
-    frequency : float
-        Of the crank, Hz; NaN where the table has no time.
-    highest : int
-        Highest order below the sampling rate's.
-    samples : float
-        Samples of a revolution.
+    `synchronised`: the crank angle was recorded, so that phases are known; `frequency`: of the crank, Hz, NaN where the table
+    has no time; `highest`: order below the sampling rate's; `samples`: of a revolution.
     """
 
     name: str
@@ -57,20 +47,10 @@ class Measured:
 def read_measured(
     path: Path, name: str, unit: str, frequency: float, turns: int = 1, sense: int = 1
 ) -> Measured:
-    """Read a signal from a table.
+    """Read a signal from a table: columns ``time [s]`` or ``crank_angle [deg]``, or both, and signals by their names.
 
-    Parameters
-    ----------
-    path : Path
-        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]``, or both, and the signals by their names.
-    name, unit : str
-        Signal and its SI unit.
-    frequency : float
-        Of a revolution of the drive in the scene, Hz.
-    turns, sense : int
-        Turns of the crank in a revolution of the drive, and -1 where the crank turns clockwise.
-
-    Raises InputError: the table cannot be read, lacks the signal, or has too few revolutions.
+    `frequency`: of a revolution of the drive in the scene, Hz; `turns`, `sense`: turns of the crank in it, and -1 where the
+    crank turns clockwise. Raises InputError: the table cannot be read, lacks the signal, or has too few revolutions.
     """
     sheet = read_series(path)
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
@@ -105,19 +85,11 @@ def read_measured(
 
 
 def loaded(scene: Scene, path: Path, words: str) -> Scene:
-    """Return a scene whose slider bears a measured pressure: its mean over the revolutions, by the crank angle.
+    """A slider-crank whose slider bears a measured pressure, towards the crank: its mean over the revolutions, by the crank
+    angle.
 
-    Parameters
-    ----------
-    scene : Scene
-        Of a slider-crank.
-    path : Path
-        Table with the crank angle.
-    words : str
-        ``COLUMN=AREA``: the pressure pushes the piston towards the crank.
-
-    Raises InputError: the words are another thing, the table lacks the angle or the column, or the scene is of another
-    mechanism.
+    `words`: ``COLUMN=AREA``. Raises InputError: they are another thing, the table lacks the angle or the column, or the scene
+    is of another mechanism.
     """
     name, _, size = words.partition("=")
     if not size:

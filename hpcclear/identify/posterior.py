@@ -66,17 +66,11 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class Model:
-    """Models of an ensemble's summaries: of all members, and of all but one group.
+    """Models of an ensemble's summaries: of all members at `places` (n, d), and of all but one group.
 
-    Attributes
-    ----------
-    places : ndarray, shape (n, d)
-    summaries, rest : ndarray, shapes (n, q) and (n, p)
-        Summaries of the members' features, each by regressions without the member, and what these leave of the features.
-    likelihoods : tuple of Likelihood
-        That of all members first, then one for each group left out.
-    distances : tuple of ndarray, shape (p, p)
-        Inverse covariances of the rests, in the same order.
+    `summaries` (n, q), `rest` (n, p): of the members' features, each by regressions without the member, and what these leave
+    of them; `likelihoods`: that of all members, then one for each group left out; `distances`, (p, p) each: inverse
+    covariances of the rests, in the same order.
     """
 
     places: Array
@@ -125,14 +119,8 @@ class Model:
 class Calibration:
     """What members of the ensemble, treated as machines, teach about intervals and fits.
 
-    Attributes
-    ----------
-    widening : ndarray, shape (unknowns,)
-        By which half-widths are multiplied, at least 1.
-    coverage : ndarray, shape (unknowns,)
-        Share of members whose truth lies in the 95 % interval before widening.
-    fits : ndarray, shape (members,)
-        As of `Model.fit`.
+    `widening` (unknowns,): by which half-widths are multiplied, at least 1; `coverage` (unknowns,): share of members whose
+    truth lies in the 95 % interval before; `fits` (members,): as of `Model.fit`.
     """
 
     widening: Array

@@ -32,14 +32,9 @@ PARTS = 3
 class Sensor:
     """What a sensor makes of a signal.
 
-    Parameters
-    ----------
-    band : (float, float)
-        Frequencies that pass, Hz; the upper one is that of the anti-aliasing filter.
-    resonance, quality : float
-        Mounting resonance, Hz, and its quality factor.
-    gain_error, angle_error : float
-        Standard deviations of the calibration factor (relative) and of the crank-angle reference (rad).
+    `band`: frequencies that pass, Hz, the upper one that of the anti-aliasing filter; `resonance`, `quality`: mounting
+    resonance, Hz, and its quality factor; `gain_error`, `angle_error`: standard deviations of the calibration factor
+    (relative) and of the crank-angle reference (rad).
     """
 
     band: tuple[float, float] = (0.0, np.inf)
@@ -56,15 +51,8 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Harmonics of one or more signals.
-
-    Parameters
-    ----------
-    mean : ndarray of complex, shape (..., orders)
-        Mean over the revolutions, from order 0 on.
-    variance : ndarray, shape (..., orders)
-        Variance between revolutions, real and imaginary part together.
-    revolutions : int
+    """Harmonics (..., orders) of one or more signals: complex means over the revolutions, from order 0 on, and variances
+    between them, real and imaginary part together.
     """
 
     mean: Array
@@ -107,20 +95,10 @@ def names_of(response: Results) -> list[str]:
 
 
 def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
-    """Return the harmonics of each whole revolution.
+    """Complex harmonics (revolutions, ORDERS + 1) of each whole revolution; order k > 0 with the amplitude of its cosine and
+    sine.
 
-    Parameters
-    ----------
-    turns : ndarray, shape (t,)
-        Revolutions of the crank, rising; whole numbers are at angle 0.
-    values : ndarray, shape (t,)
-    count : bool
-        Whether the values are events to be counted.
-
-    Returns
-    -------
-    ndarray of complex, shape (revolutions, ORDERS + 1)
-        Order k > 0 with the amplitude of its cosine and sine.
+    `turns` (t,): revolutions of the crank, rising; whole numbers are at angle 0. `count`: the values (t,) are events.
     """
     slack = 2.0 * float(np.median(np.diff(turns)))
     first, last = int(np.ceil(turns[0] - slack)), int(np.floor(turns[-1] + slack))

@@ -43,16 +43,9 @@ PREDICTABLE = 0.1
 class InputRegression:
     """An input, between 0 and 1, as a function of features.
 
-    Attributes
-    ----------
-    centre, scale : ndarray, shape (p,)
-        Mean of the features, and the reciprocals of their units; 0 where a feature is not used.
-    rows : ndarray, shape (n, p)
-        Features of the members in these units.
-    weights : ndarray, shape (n,)
-    length : float
-    left_out : ndarray, shape (n,)
-        Of each member, by the regression without it.
+    `centre`, `scale` (p,): mean of the features, and the reciprocals of their units, 0 where a feature is not used; `rows`
+    (n, p): features of the members in these units; `weights` (n,); `left_out` (n,): of each member, by the regression without
+    it.
     """
 
     centre: Array
@@ -71,18 +64,9 @@ class InputRegression:
 def regressions(
     features: Array, noise: Array, orders: Integers, places: Array
 ) -> tuple[InputRegression, ...]:
-    """Return a regression of each input.
+    """A regression of each input, of members at `places` (n, d) with features (n, p) that have noise as measured.
 
-    Parameters
-    ----------
-    features : ndarray, shape (n, p)
-        Of the members, with noise as measured.
-    noise : ndarray, shape (p,)
-        Its variances.
-    orders : ndarray, shape (p,)
-        Highest harmonic in each feature.
-    places : ndarray, shape (n, d)
-        Inputs of the members.
+    `noise`, `orders` (p,): its variances, and the highest harmonic in each feature.
     """
     centre = features.mean(axis=0)
     best: list[InputRegression | None] = [None] * places.shape[1]
@@ -137,12 +121,8 @@ def _kernel(rows: Array, others: Array, length: float) -> Array:
 class Expected:
     """Features that members with the same summaries have, by ridge regression on trigonometric functions.
 
-    Attributes
-    ----------
-    frequency, phase : ndarray, shapes (q, t) and (t,)
-    coefficients : ndarray, shape (1 + q + t, p)
-    left : ndarray, shape (n, p)
-        What the regression without it leaves of each member's features.
+    `frequency` (q, t), `phase` (t,), `coefficients` (1 + q + t, p); `left` (n, p): what the regression without it leaves of
+    each member's features.
     """
 
     frequency: Array

@@ -35,19 +35,10 @@ LARGEST_FAILURE = 0.1
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Members that were simulated.
+    """Members that were simulated, without those that `failed`.
 
-    Attributes
-    ----------
-    inputs : Inputs
-    places : ndarray, shape (n, size + 2)
-        In the unit cube; the last two columns are those of the sensor's own errors.
-    names : tuple of str
-        Signals.
-    spectra : ndarray, shape (n, signals, PARTS, orders)
-    revolutions : int
-    failed : int
-        Members that were left out.
+    `places` (n, size + 2): in the unit cube; the last two columns are those of the sensor's own errors. `names`: of the
+    signals; `spectra` (n, signals, PARTS, orders).
     """
 
     inputs: Inputs
@@ -79,22 +70,7 @@ def ensemble_of(
     scene: Scene, inputs: Inputs, names: Sequence[str], members: int, seed: int, ranks: Ranks,
     checkpoint: Checkpoint | None = None, quiet: bool = True,
 ) -> Ensemble:  # fmt: skip
-    """Simulate an ensemble on all ranks; on root.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of `prepared_scene`.
-    inputs : Inputs
-    names : sequence of str
-    members : int
-        A power of two.
-    seed : int
-    ranks : Ranks
-    checkpoint : Checkpoint, optional
-        Keeps finished members.
-    quiet : bool
-        Whether nothing is printed meanwhile.
+    """Simulate so many members of an ensemble, a power of two, on all ranks; on root. The checkpoint keeps finished ones.
 
     Raises InputError: more than `LARGEST_FAILURE` of the members fail. Raises Stopped, RankFailed, StorageError.
     """

@@ -85,14 +85,9 @@ def boundary(
 ) -> Iterator[Ranks]:
     """A block in which root has all ranks, and which no error leaves; the others work for it and do not come in.
 
-    Parameters
-    ----------
-    stop : StopSwitch, optional
-        Entered already, to hear signals from early on; by default one without a time limit.
-    ahead : sequence of str
-        Modules that the other ranks load while root reads what is to be done.
-    resumes : bool
-        The same block goes on from what this one saved when it was stopped early.
+    `stop`: entered already, to hear signals from early on; by default one without a time limit. `ahead`: modules that the
+    other ranks load while root reads what is to be done. `resumes`: the same block goes on from what this one saved when it
+    was stopped.
 
     Raises SystemExit on all other ranks instead of the block, and on root unless all went well. The exit code is the same on
     every rank: 0, or that of a `sys.exit` in the block; 1 after a program error, a refused write or want of memory, reported
@@ -169,13 +164,7 @@ def _watch(ranks: Ranks) -> Watch:
 
 
 def refuse_together(complaint: str) -> int:
-    """End all ranks because this one cannot begin: the others wait for it in MPI; exit code 2.
-
-    Parameters
-    ----------
-    complaint : str
-        What is wrong, as it is to be shown once, by root.
-    """
+    """End all ranks because this one cannot begin: the others wait for it in MPI; exit code 2. Root shows why, once."""
     try:
         mail = _open_mail(COMPLAINT_PATIENCE)
     except InputError:

@@ -36,13 +36,7 @@ _THREADS = (
 
 
 def launched_size(environment: Mapping[str, str] = os.environ) -> tuple[str, int]:
-    """Number of processes a launcher says it started, and the variable that says so.
-
-    Returns
-    -------
-    tuple of str and int
-        ``("", 1)`` when no launcher left a trace.
-    """
+    """Variable in which a launcher says how many processes it started, and this number; ``("", 1)`` without a launcher."""
     for name in _SIZE:
         if environment.get(name, "").isdigit() and int(environment[name]) > 1:
             return name, int(environment[name])

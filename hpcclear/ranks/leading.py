@@ -38,28 +38,13 @@ def run_points(
     progress: Progress | None = None,
     keep: bool = True,
 ) -> np.ndarray:
-    """Simulate a design on all ranks; call it on root, as often as needed.
+    """Simulate a design on all ranks; call it on root, as often as needed. Returns a record a sample in ascending order if
+    `keep`.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, d), or PointSource
-        The design, or an object that makes the rows requested.
-    completed : structured ndarray, optional
-        Records of samples finished before; they are not simulated again.
-    on_records : callable, optional
-        Gets every batch of newly finished records, on root, as they arrive.
-    save : callable, optional
-        Called after each batch, to write what has gathered; not again once anything has failed,
-        while `on_records` still gets what the ranks had finished by then.
-    progress : Progress, optional
-        Shown meanwhile.
-    keep : bool, optional
-        Return the records; without, memory does not grow with them.
-
-    Returns
-    -------
-    structured ndarray
-        One record a sample in ascending order, whoever made it; empty unless `keep`.
+    `points` are an array (n, d) or an object that makes the rows requested; samples whose records are `completed` are not
+    simulated again. `on_records` gets every batch of newly finished records, on root, as they arrive; `save` is called after
+    each batch, to write what has gathered; not again once anything has failed, while `on_records` still gets what the ranks
+    had finished by then. Without `keep` memory does not grow with the records.
 
     Raises Stopped if requested to end early; `on_records` got everything that was finished, `save` may be due. Raises
     RankFailed if another rank failed; likewise.

@@ -68,23 +68,11 @@ class Backoff:
 
 
 class Mail:
-    """One rank's mailbox.
+    """One rank's mailbox. `mpi` is initialised, if given: every rank makes its mailbox at the same time.
 
-    Parameters
-    ----------
-    mpi : module, optional
-        ``mpi4py.MPI``, initialised; every rank makes its mailbox at the same time.
-    finalizes : bool, optional
-        Whether this job ends MPI, which it does if it began it.
-
-    Attributes
-    ----------
-    rank, size : int
-        This process, and how many there are.
-    node_rank, node_size, node_cores : int
-        The same within this node, and the cores its ranks may use together.
-    neighbours : list of int
-        Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
+    `finalizes`: whether this job ends MPI, which it does if it began it. `rank`, `size`: this process, and how many there
+    are; `node_rank`, `node_size`: the same within this node, whose ranks may use `node_cores` together; `neighbours`: ranks
+    that this one exchanges pulses with (`hpcclear.ranks.watch`).
     """
 
     def __init__(self, mpi: Any = None, finalizes: bool = True) -> None:

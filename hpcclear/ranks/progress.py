@@ -20,20 +20,10 @@ _WINDOW = 30.0  # s, over which the rate is taken: costs change over a design
 
 
 class Progress:
-    """Counts finished and failed samples, and shows them on standard error.
+    """Counts finished and failed samples of `label`, and shows them on standard error or another stream.
 
-    Parameters
-    ----------
-    label : str
-        What is going on.
-    style : {"auto", "bar", "log", "quiet"}
-        ``auto`` is a bar on a terminal, also through a local mpiexec, else a log.
-    interval : float, optional
-        Seconds between two lines of a log; 5 by default, 30 in a Slurm job.
-    stream : file, optional
-        Where to write.
-    clock : callable, optional
-        Seconds; replaced by tests.
+    `style`: ``auto`` is a bar on a terminal, also through a local mpiexec, else a log. `interval`: seconds between two lines
+    of a log; 5 by default, 30 in a Slurm job.
     """
 
     def __init__(

@@ -93,7 +93,7 @@ class Allotment(NamedTuple):
 
 
 def allot(remaining: int, ranks: int, need: Need) -> Allotment:
-    """Size of the next block for one rank: enough to stay busy, less and less towards the end.
+    """Size of the next block for one rank, of `remaining` samples: enough to stay busy, less and less towards the end.
 
     Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank
     does in about half a second (longer on many ranks, so that root is not swamped by requests),
@@ -102,23 +102,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     Stock for the time a request takes is kept while there is enough to do; at the end it would only
     sit behind one rank while another is idle, and a lane waits for its next sample instead.
 
-    Parameters
-    ----------
-    remaining : int
-        Samples not handed out yet.
-    ranks : int
-        Ranks that work.
-    need : Need
-        Lanes, stock and speed of the requesting rank.
-
-    Returns
-    -------
-    Allotment
-        ``size`` is between 1 and `remaining`, or 0 when nothing remains.
-
-    Notes
-    -----
-    Guided self-scheduling: Polychronopoulos and Kuck, IEEE Trans. Computers C-36 (1987),
+    Source of guided self-scheduling: Polychronopoulos and Kuck, IEEE Trans. Computers C-36 (1987),
     doi:10.1109/TC.1987.5009495.
     """
     horizon = max(0.5, 2e-4 * ranks)  # s; 10 000 ranks send root some 5000 requests a second
@@ -134,16 +118,9 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
 
 
 class HandOut:
-    """Root's record of one design: what is left, what is out, what is finished.
+    """Root's record of one design of `total` samples: what is left, what is out, what is finished.
 
-    Parameters
-    ----------
-    total : int
-        Samples of the design.
-    completed : ndarray of int64
-        Samples finished in an earlier run, each once; they are not handed out.
-    ranks : int
-        Ranks that work.
+    `completed`: samples finished in an earlier run, each once; they are not handed out.
     """
 
     def __init__(self, total: int, completed: np.ndarray, ranks: int) -> None:
@@ -190,15 +167,7 @@ class HandOut:
 
 
 class Kept:
-    """Records of a design in the order of its samples, put where they belong as they come: held once, never sorted.
-
-    Parameters
-    ----------
-    total : int
-        Samples of the design.
-    earlier : structured ndarray
-        Records of samples finished before.
-    """
+    """Records of a design of `total` samples in their order, put where they belong as they come: held once, never sorted."""
 
     def __init__(self, total: int, earlier: np.ndarray) -> None:
         self._records = np.empty(total, earlier.dtype)

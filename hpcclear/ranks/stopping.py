@@ -37,12 +37,8 @@ class Stopped(Exception):
 
 
 class RankFailed(Exception):
-    """Another rank cannot go on: bad input or a program error; the text is its report.
-
-    Parameters
-    ----------
-    code : int, optional
-        Exit code that follows of it.
+    """Another rank cannot go on: bad input or a program error; the text is its report, `code` the exit code that follows of
+    it.
     """
 
     def __init__(self, report: str, code: int = Exit.FAILED) -> None:
@@ -63,18 +59,9 @@ class StopSwitch:
     process has `GRACE` seconds before `last_resort` ends it: files are written whole and renamed,
     so that nothing breaks. A second SIGINT ends it at once.
 
-    Use as a context manager in the main thread, as early as possible: until then a signal kills.
-
-    Parameters
-    ----------
-    ends_process : bool, optional
-        Nothing but the end of the process follows: signals are ignored afterwards, since all is
-        said and done, rather than left to kill it. By default, the old handlers come back.
-
-    Attributes
-    ----------
-    outlook : str
-        What the same command does after an early stop: `RESUMES`, or `ANEW` where nothing is saved.
+    Use as a context manager in the main thread, as early as possible: until then a signal kills. Afterwards the old handlers
+    come back, or, if nothing but the end of the process follows (`ends_process`), signals are ignored. `outlook`: what the
+    same command does after an early stop, `RESUMES`, or `ANEW` where nothing is saved.
     """
 
     def __init__(self, ends_process: bool = False) -> None:

@@ -25,17 +25,10 @@ FLUSH_INTERVAL = 1.0
 
 
 class Ranks:
-    """The processes of one job. Made by `run_on_ranks`, or by `alone` for one process.
+    """The processes of one job. Made by `run_on_ranks`, or by `alone` for one process; `is_root`: this one runs the program.
 
-    Attributes
-    ----------
-    rank, size : int
-        This process, and how many there are.
-    is_root : bool
-        Whether this process runs the program.
-    stage_seconds : dict of str to ndarray
-        On root: seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`;
-        every row of a stage adds up to its wall time.
+    `stage_seconds`: on root, seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`; every row of a
+    stage adds up to its wall time.
     """
 
     def __init__(self, mail: Mail, stop: StopSwitch) -> None:
@@ -104,18 +97,10 @@ class Ranks:
     def everywhere(
         self, name: str, function: Callable[[Any, "Ranks"], object], payload: object
     ) -> None:
-        """Call `function(payload, ranks)` once on every rank, and wait until all have returned; on root.
+        """Call `function(payload, ranks)` of a module once on every rank, and wait until all have returned; on root.
 
-        Parameters
-        ----------
-        name : str
-            For reports and timing; the time is booked as set-up.
-        function : callable
-            A function of a module: pickle sends its name.
-        payload : object
-            Travels to every rank.
-
-        Raises Stopped if requested to end early. Raises RankFailed if another rank failed.
+        `name`: for reports and timing; the time is booked as set-up. Raises Stopped if requested to end early, RankFailed if
+        another rank failed.
         """
         with self.timed(name) as spent:
             self.raise_if_stopped()

@@ -61,14 +61,9 @@ class Neighbour:
         self.gone = self.gone or tag == _BYE
 
     def beat(self, lives: bool | None, patience: float) -> bool:
-        """Another beat of ours; whether the rank is given up now.
+        """Another beat of ours; whether the rank is given up now, after so many beats without a pulse (`patience`).
 
-        Parameters
-        ----------
-        lives : bool or None
-            What the system says of it: it computes, it has ended, or nothing.
-        patience : float
-            Beats without a pulse that are borne.
+        `lives`: what the system says of it: it computes, it has ended, or nothing (None).
         """
         heard, self._heard = self._heard, False
         if self.gone or self._lost:
@@ -87,14 +82,8 @@ class Neighbour:
 class Watch:
     """The thread of one rank that knows who lives.
 
-    Parameters
-    ----------
-    seconds : float
-        Silence after which a rank is given up; 0 for never.
-    on_loss : callable
-        Gets the rank that was given up; called by the thread.
-    on_orphan, is_orphan : callable
-        Called once by the thread when `is_orphan` says that what started this process is gone; None: that is not watched.
+    `on_loss` gets the rank that was given up after so many seconds of silence (0: never); `on_orphan` is called once when
+    `is_orphan` says that what started this process is gone (None: that is not watched). The thread calls both.
     """
 
     def __init__(

@@ -12,14 +12,7 @@ from hpcclear.ranks.schedule import QUANTUM, Need, Worker
 class WorkQueue:
     """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
 
-    Parameters
-    ----------
-    worker : Worker
-        The simulations of this rank.
-    clock : callable
-        Seconds; replaced by tests.
-    recent : ndarray, shape (2,), optional
-        Finished samples and busy seconds, the older the less weight: of such a worker before, and kept up.
+    `recent`: finished samples and busy seconds (2,), the older the less weight, of such a worker before; kept up.
     """
 
     def __init__(

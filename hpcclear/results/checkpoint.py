@@ -71,36 +71,13 @@ class _Part:
 
 
 class Checkpoint:
-    """Finished samples and stages of one run, in a directory of their own.
+    """Finished samples and stages of one run, in a directory of their own; a part file every `interval` seconds.
 
-    Opening it makes the directory, removes rubbish that a kill left, and reads what is there. One
-    process uses it at a time: hold a `hpcclear.base.lock.Lock`.
-
-    Parameters
-    ----------
-    directory : Path
-        Where the files go; made when missing (its parent exists), never a symbolic link.
-    key : mapping of str to str
-        What makes the run what it is; see `check_key`.
-    interval : float
-        Seconds between two part files.
-    names : sequence of str
-        Design variables whose values `add` gets, by name or scene path.
-    units : mapping of str to str, optional
-        Units of those that are not the paper's.
-    attributes : mapping, optional
-        Global attributes of the part files (`Scene.origin` and `hpcclear.results.provenance.program`).
-    joints : sequence of str
-        Labels of the joints of the records.
-    record : dtype
-        Their type (`hpcclear.scene.scene.record_of`).
-    clock : callable
-        Seconds since any instant.
-
-    Attributes
-    ----------
-    problems : list of str
-        What was found on disk and could not be used, a sentence each.
+    Opening it makes the directory (not its parent), removes rubbish that a kill left, and reads what is there. One process
+    uses it at a time: hold a `hpcclear.base.lock.Lock`. `key`: what makes the run what it is, see `check_key`; `names`:
+    design variables whose values `add` gets, by name or scene path, `units` of those that are not the paper's; `attributes`:
+    of the part files; `joints`: labels of the joints of the records, whose type is `record`
+    (`hpcclear.scene.scene.record_of`). `problems`: what was found on disk and could not be used, a sentence each.
 
     Raises InputError: the directory holds another run's results, is a link, or cannot be written to. Raises StorageError: the
     disk fails.
@@ -244,14 +221,9 @@ class Checkpoint:
     # -- stages ---------------------------------------------------------------------------------
 
     def save_stage(self, name: str, data: Mapping[str, ArrayLike]) -> None:
-        """Write the results of a stage: arrays, numbers, truth values, text; raises as `flush`.
+        """Write the results of a stage: arrays of any shape, numbers, truth values, text; raises as `flush`.
 
-        Parameters
-        ----------
-        name : str
-            Letters, digits, ``_`` and ``-``.
-        data : mapping of str to array
-            Real numbers, whole numbers, truth values or text, of any shape.
+        `name`: of letters, digits, ``_`` and ``-``.
         """
         with self._watch.running():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}

@@ -22,18 +22,10 @@ Other = TypeVar("Other")
 
 
 class Variable:
-    """An array with names of its dimensions and with attributes; ValueError where these do not match.
+    """An array with names of its dimensions and with attributes, ``units`` and ``long_name``; ValueError where these do not
+    match.
 
-    Attributes
-    ----------
-    dims : tuple of str
-    values : ndarray
-    attrs : dict
-        ``units`` and ``long_name``, as a file has them.
-    name : str
-        Of a variable of `Results`, "" of another one.
-    labels : mapping of str to ndarray
-        Coordinates of the results that it is of, by dimension.
+    `name`: of a variable of `Results`, "" of another one; `labels`: coordinates of these results, by dimension.
     """
 
     def __init__(
@@ -111,17 +103,9 @@ def place_of(known: np.ndarray, wanted: Any) -> Place:
 class Results:
     """Variables by their names, and global attributes. A variable that is called as its dimension is a coordinate.
 
-    Its methods are called as those of a dataset of xarray and do the same. Raises ValueError where two variables do not agree
-    on the size of a dimension.
-
-    Attributes
-    ----------
-    variables : dict of str to Variable
-    attrs : dict
-    sizes : dict of str to int
-        Of the dimensions, in the order in which the variables have them.
-    labels : dict of str to ndarray
-        Coordinates; of a dimension that a selection took away the label that was chosen.
+    Its methods are called as those of a dataset of xarray and do the same. `sizes`: of the dimensions, in the order in which
+    the variables have them; `labels`: coordinates, of a dimension that a selection took away the label that was chosen.
+    Raises ValueError where two variables do not agree on the size of a dimension.
     """
 
     def __init__(

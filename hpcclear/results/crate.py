@@ -22,15 +22,9 @@ _STATED = ("source", "license", "hpcclear_version", "versions", "processor")
 
 
 def write_crate(directory: Path, notify: Callable[[str], object] = lambda text: None) -> Path:
-    """Write DIRECTORY/ro-crate-metadata.json from what the result files below it say of themselves.
+    """Write DIRECTORY/ro-crate-metadata.json from what the result files below it say of themselves, and return its path.
 
     Equal files of equal ages give equal bytes. `notify` gets a sentence for each file that is damaged and left out.
-
-    Returns
-    -------
-    Path
-        Of the file.
-
     Raises InputError: there is no result file, all are damaged, or a file of that name says something else: its user may have
     added to it.
     """

@@ -27,14 +27,8 @@ _ATTEMPTS = 5  # of writing a file whose temporary a run that starts takes for s
 def refuse_foreign(path: Path, mark: bytes) -> None:
     """Refuse to replace what this program did not write: devices, pipes, and files without its mark.
 
-    Parameters
-    ----------
-    path : Path
-        Where something is to be written; what is not there is nobody's. A symbolic link to a file may
-        be replaced, since what it leads to stays.
-    mark : bytes
-        What every file of the kind to be written holds near one of its ends; empty: none may be there.
-
+    What is not there is nobody's. A symbolic link to a file may be replaced, since what it leads to stays. `mark`: what every
+    file of the kind to be written holds near one of its ends; empty: none may be there.
     Raises InputError: something of somebody else's is in the way.
     """
     try:

@@ -17,18 +17,9 @@ def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
 
 
 def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
-    """Refuse results of another run.
+    """Refuse results of another run than the one that `key` names: by scene, version, seed and so on.
 
-    Parameters
-    ----------
-    content : Results or xarray.Dataset
-        What was read from `place`.
-    key : mapping of str to str
-        What makes this run what it is: scene, version, seed, ...; flattened entries of a scene
-        make the message name the entries that changed.
-    place : Path
-        For the message.
-
+    Flattened entries of a scene make the message name the entries that changed; `place`: of the results, for the message.
     Raises InputError: the keys differ; the message lists where.
     """
     found = key_of(content)

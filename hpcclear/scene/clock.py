@@ -56,13 +56,7 @@ def is_clock(cell: str) -> bool:
 
 
 def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
-    """Seconds since the first of clock times or dates; times of day go on after midnight.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    where : callable
-        Place of a cell by its number, in errors.
+    """Seconds since the first of clock times or dates; times of day go on after midnight. `where`: place of a cell, in errors.
 
     Raises InputError: a cell is none, is another kind than those above it, or the order of day and month is open.
     """

@@ -85,20 +85,10 @@ class Correlation(Table):
         return [order.index(blocks[n]) + 1 if blocks.get(n) in order else 0 for n in names]
 
     def together(self, names: Sequence[str], chances: Sequence[Array]) -> list[Array]:
-        """Probabilities that vary together, from independent ones.
+        """Probabilities (n,) each, strictly between 0 and 1, that vary together, from independent ones; others stay what they
+        were.
 
-        Parameters
-        ----------
-        names : sequence of str
-            What varies. The first input of the matrix that is among them keeps its own numbers, the next mixes them with
-            its own, and so on.
-        chances : sequence of arrays, shape (n,) each
-            Strictly between 0 and 1.
-
-        Returns
-        -------
-        list of arrays, shape (n,) each
-            Those of names that are not among the inputs are what they were.
+        The first input of the matrix that is among `names` keeps its own numbers, the next mixes them with its own, and so on.
         """
         from scipy.special import ndtr, ndtri  # as in `hpcclear.base.quantiles`
 

@@ -31,18 +31,10 @@ class Box:
 
 
 def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
-    """Bounds of some study variables.
+    """Bounds of some study variables, in the order of `names`; of all of them by default.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    names : sequence of str, optional
-        Study variables, in the order of the columns; all of them by default.
-    widen : iterable of str
-        Random inputs by whose reach the box grows, so that a surrogate trained on it never
-        extrapolates. Those that are absolute, or no variables among `names`, change nothing.
-
+    It grows by the reach of the random inputs `widen`, so that a surrogate trained on it never extrapolates; those that are
+    absolute, or no variables among `names`, change nothing.
     Raises InputError if a name is unknown, or the widened box would hold inertias of 0 or below.
     """
     study = scene.required_study

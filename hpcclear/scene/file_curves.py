@@ -101,19 +101,9 @@ class FileCurve(Table):
 def pairs_of(
     curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
 ) -> tuple[list[list[float]], str]:
-    """The pairs of a curve against the crank angle, rad and `unit`, rising, and what was read in words.
+    """The pairs of a curve against the crank angle, rad and `unit` (N or N*m), rising, and what was read in words.
 
-    Parameters
-    ----------
-    folder : Path
-        What its file is relative to.
-    unit : str
-        Of the entry that it stands for: N or N*m.
-    key : str
-        Of that entry.
-    turns : int
-        Of a revolution of the scene: a file of one turn is repeated as often.
-
+    `key`: the entry that it stands for; `turns`: of a revolution of the scene, a file of one turn is repeated as often.
     Raises InputError if the file is no such curve; it says what was found.
     """
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
@@ -266,14 +256,7 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
 def with_values(
     content: Mapping[str, object], folder: Path
 ) -> tuple[Mapping[str, object], list[str]]:
-    """The content of a scene with what files hold in the place of their names, and a sentence for each.
-
-    Parameters
-    ----------
-    content : mapping
-        Parsed, not validated.
-    folder : path
-        What names of files are relative to.
+    """The parsed content of a scene with what files in `folder` hold in the place of their names, and a sentence for each.
 
     Raises InputError if a file cannot be read, has no such column or a cell in it is no number.
     """

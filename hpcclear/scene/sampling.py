@@ -23,19 +23,9 @@ from hpcclear.scene.study import Study
 
 
 def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
-    """A Latin hypercube in the unit cube: each of `samples` equal strata of each axis holds one
-    point.
+    """A Latin hypercube in the unit cube (samples, dimensions): each of `samples` equal strata of each axis holds one point.
 
-    Parameters
-    ----------
-    samples, dimensions : int
-        Shape (n, d) of the result.
-    rng : Generator
-        Source of randomness; it is advanced.
-
-    References
-    ----------
-    McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
+    Source: McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
     """
     from scipy.stats import qmc  # most of a second to import; a single response needs none of it
 
@@ -50,28 +40,11 @@ def latin_hypercube(
     widen: Iterable[str] = (),
     purpose: str = "train",
 ) -> Points:
-    """The study's Latin hypercube over its variables.
+    """The study's Latin hypercube over its variables, SI; a variable given as a ratio comes as the inertia it stands for.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    samples : int, optional
-        Number of points, `study.samples` by default.
-    names : sequence of str, optional
-        The variables that vary, in the order of the columns, all by default; the others stay as in
-        the scene.
-    widen : iterable of str
-        Random inputs by whose reach the box is widened.
-    purpose : str
-        Designs for different purposes are independent; the same purpose gives the same points.
-
-    Returns
-    -------
-    Points
-        In SI; a variable given as a ratio comes as the inertia it stands for.
-
-    Raises InputError if the scene has no study, a name is unknown, or a point makes no mechanism.
+    `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. `widen`:
+    random inputs by whose reach the box is widened. Designs for different purposes are independent; the same purpose gives the
+    same points. Raises InputError if the scene has no study, a name is unknown, or a point makes no mechanism.
     """
     study = scene.required_study
     count = _count(study, samples)
@@ -134,31 +107,18 @@ def monte_carlo(
     replicate: int | None = None,
     stratified: bool = False,
 ) -> Points:
-    """Samples `first` to `first + samples` of the study's random inputs.
+    """Samples `first` to `first + samples` of the study's random inputs (all of them, or those in `random`), SI.
 
     Sample k is the same however many are drawn, and each input has a stream of its own, so that a
-    further random input leaves the others as they were.
+    further random input leaves the others as they were; another `purpose` has other streams.
 
-    Parameters
-    ----------
-    scene, samples
-        As `latin_hypercube`.
-    random : sequence of str, optional
-        Random inputs in use, all by default; a case's `random` to verify its designs.
-    design : mapping of variable name to SI value, optional
-        Where the design is: columns that are not random hold it, and inputs that follow the design
-        scatter about it. Left out, variables without a distribution are uniform over their range,
-        and inputs scatter about the scene.
-    purpose, first
-        Which stream, and where in it to begin.
-    replicate : int, optional
-        Number of a randomised Sobol sequence whose samples replace independent ones; each sequence
-        is one independent estimate. Begin and end at powers of two.
-    stratified : bool
-        A Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together the first
-        alone keeps its strata.
+    Columns that are not random hold the `design`, and inputs that follow it scatter about it. Without one, variables without a
+    distribution are uniform over their range, and inputs scatter about the scene.
 
-    Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
+    With a `replicate`, samples of the randomised Sobol sequence of this number replace independent ones; each sequence is one
+    independent estimate: begin and end at powers of two. `stratified`: a Latin hypercube of probabilities in their place; all
+    of it, so from index 0 on. Of inputs that vary together the first alone keeps its strata. Raises InputError as
+    `latin_hypercube`.
     """
     study = scene.required_study
     count = _count(study, samples, first)
@@ -295,15 +255,7 @@ _PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
 
 
 class MonteCarloPoints:
-    """The study's Monte Carlo points by index, generated on request and not stored.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    total : int
-        Number of points.
-    """
+    """The study's Monte Carlo points by index, `total` of them, generated on request and not stored."""
 
     def __init__(self, scene: Scene, total: int) -> None:
         self._scene, self._total = scene, total

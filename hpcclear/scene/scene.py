@@ -161,10 +161,7 @@ def _unpickled(content: Content, text: str, readings: tuple[str, ...], texts: Te
 def record_of(scene: Scene, mapped: bool = False) -> np.dtype:
     """Type of the record of a sample of a scene: its contacts and bands, and fields of what it requests.
 
-    Parameters
-    ----------
-    mapped : bool
-        Whether the motion of each sample is judged, as in a map; by default only with a target error.
+    `mapped`: the motion of each sample is judged, as in a map; by default only with a target error.
     """
     judged = mapped or (scene.numerics.target_error is not None and scene.clearance_joints())
     asked = {

@@ -255,17 +255,9 @@ class Sheet:
 
 
 def read(place: Path, what: str = "table of points", headed: bool = True) -> Sheet:
-    """Read a table.
+    """Read a table: a CSV file, or a workbook (.xlsx); "book.xlsx#Sheet" for one of several sheets.
 
-    Parameters
-    ----------
-    place : Path
-        A CSV file, or a workbook (.xlsx); "book.xlsx#Sheet" for one of several sheets.
-    what : str
-        What it is for, in errors.
-    headed : bool
-        Whether headings are needed; else columns without them have the names "1", "2" and so on.
-
+    `what` it is for, in errors; where it need not be `headed`, columns without headings have the names "1", "2" and so on.
     Raises InputError if it is none, or holds what can be read in two ways: the message says what was found, and where.
     """
     path, page = place_of(place)

@@ -203,11 +203,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
 class Off:
     """A scene with some of its effects off, and where the numbers of the whole one stand in it.
 
-    Attributes
-    ----------
-    scene : Scene
-        Its study varies what is left; a design variable that drives nothing any more is gone.
-
+    The study of `scene` varies what is left; a design variable that drives nothing any more is gone.
     Raises InputError: without them the scene is none, or its study has nothing left to vary or to optimise.
     """
 

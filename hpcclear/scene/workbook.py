@@ -65,18 +65,8 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> Rows:
 
 
 class _Book:
-    """The parts of a workbook.
-
-    Attributes
-    ----------
-    left : int
-        Bytes that may still be unpacked.
-    texts : list of str
-        Shared texts.
-    formats : list of str
-        What the numbers of each style are: "" for plain ones, "percent", "date", "time", "elapsed", " mm".
-    epoch : datetime.datetime
-        The day 0.
+    """The parts of a workbook: shared `texts`, `left` bytes that may still be unpacked, `epoch` (the day 0), and `formats`,
+    what the numbers of each style are: "" for plain ones, "percent", "date", "time", "elapsed", " mm".
     """
 
     def __init__(self, path: Path, data: bytes, what: str) -> None:
@@ -237,10 +227,7 @@ def _local(tag: str) -> str:
 class _Text:
     """Text of <t> elements, without readings in another script; no more of it than a cell may have.
 
-    Attributes
-    ----------
-    parts : deque of str
-        Pieces of the element that is read; the first go where there are very many.
+    `parts`: pieces of the element that is read; the first go where there are very many.
     """
 
     def __init__(self) -> None:
@@ -263,15 +250,7 @@ class _Text:
 
 
 class _Page:
-    """The rows of a sheet.
-
-    Attributes
-    ----------
-    rows : dict of int to list of str
-        Cells by the number of their row.
-    merged : list of tuple
-        Ranges that are merged over several columns, and their first rows.
-    """
+    """The cells of the `rows` of a sheet by their number; `merged`: ranges over several columns, and their first rows."""
 
     def __init__(self, book: _Book, part: str) -> None:
         self.book = book

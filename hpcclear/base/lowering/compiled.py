@@ -145,18 +145,10 @@ def assembly_of(module: llvm.ModuleRef) -> str:
 class Compiled:
     """A function as machine code. `address` is what C functions are called by; Python calls the object.
 
-    Parameters
-    ----------
-    function : callable
-        At the top of a module; marked by `lane_function` or `scalar_function`, if calls are to be written out.
-    kinds : sequence of Kind
-        Of its arguments that are not known.
-    flags : set of str
-        Rewrites allowed in its arithmetic.
-    result : ctypes type, optional
-        What it returns to Python; whether something is true it returns as a whole number.
-    **known
-        Parameters that are known: numbers, None, tuples of them. The code has the others.
+    The function stands at the top of a module, and is marked by `lane_function` or `scalar_function` if calls are to be
+    written out. `known` are the parameters that are known: numbers, None, tuples of them; the code has the others, of these
+    `kinds`. `flags`: rewrites allowed in its arithmetic; `result`: what it returns to Python, a truth value as a whole
+    number.
     """
 
     def __init__(

@@ -29,19 +29,10 @@ _NODES = (16, 28)  # eccentricities, angles of w
 
 
 def pressures(eccentricity: float, ratio: float) -> tuple[Array, Array]:
-    """Pressure over mu |w| R^2/c^3 of films squeezed along the eccentricity and across, whole, by mode.
+    """Pressure over mu |w| R^2/c^3 of films squeezed along the eccentricity (over c) and across, whole, by mode (modes,
+    _AROUND).
 
-    Parameters
-    ----------
-    eccentricity : float
-        Over the clearance.
-    ratio : float
-        Length over diameter.
-
-    Returns
-    -------
-    tuple of ndarray, shape (modes, _AROUND)
-        At even angles from the thinnest film, each mode over cos((2 j + 1) pi z/L).
+    At even angles from the thinnest film, each mode over cos((2 j + 1) pi z/L); `ratio`: length over diameter.
     """
     s = np.sqrt(1.0 - eccentricity**2)
     decay = (1.0 - s) / eccentricity if eccentricity > 0.0 else 0.0

@@ -51,17 +51,10 @@ FORMATS = (
 
 
 def drawing_of(path: Path, unit: str = "") -> Drawing:
-    """The linkage that a file holds.
+    """The linkage that a file holds, in any of `FORMATS`; `unit`: of lengths, where the file states none.
 
-    Parameters
-    ----------
-    path : Path
-        In any of `FORMATS`.
-    unit : str
-        Of lengths, where the file states none. One that contradicts the file is refused; of a drawing it is used and noted,
-        since drawings often state the unit of a template.
-
-    Raises InputError if no format fits the file, or the file has parts that a scene cannot have.
+    A unit that contradicts the file is refused; of a drawing it is used and noted, since drawings often state that of a
+    template. Raises InputError if no format fits the file, or the file has parts that a scene cannot have.
     """
     if unit:
         with at("--unit", unit):

@@ -24,12 +24,7 @@ _LISTED = 12
 class Names:
     """Names that a scene can have, each once, for those of a file.
 
-    Parameters
-    ----------
-    kind : str
-        What they name, in notes, such as "layer".
-    prefix : str
-        Before a name that does not begin with a letter.
+    `kind`: what they name, in notes, such as "layer"; `prefix`: goes before a name that does not begin with a letter.
     """
 
     def __init__(self, kind: str, prefix: str) -> None:
@@ -102,16 +97,7 @@ class File(NamedTuple):
         return value
 
     def scale(self, stated: float | None, words: str, where: str = "") -> float:
-        """Return the unit of the lengths, m.
-
-        Parameters
-        ----------
-        stated : float or None
-            What the file states, m.
-        words : str
-            The same in words.
-        where : str
-            Where it would, in errors.
+        """The unit of the lengths, m: that which the file states, if any, also in words; `where` it would, in errors.
 
         Raises InputError if neither the file nor the user says a unit, or they contradict each other.
         """

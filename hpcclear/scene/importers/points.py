@@ -51,13 +51,7 @@ class Drawing(NamedTuple):
 
 
 def scene_of(drawing: Drawing, key: str) -> Content:
-    """The tables of a scene whose linkage has its points where a drawing has them.
-
-    Parameters
-    ----------
-    drawing : Drawing
-    key : str
-        The file, in errors.
+    """The tables of a scene whose linkage has its points where a drawing has them; `key`: the file, in errors.
 
     Raises InputError if the bodies make no linkage.
     """
