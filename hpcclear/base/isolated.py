@@ -14,7 +14,7 @@ _OWN = os.path.abspath(__file__)
 
 
 def python(function: str, *words: str) -> list[str]:
-    """Command line of a process that calls ``"module:function"`` of this package with words and exits with what that returns."""
+    """Command line of a process that calls ``"module:function"`` with words and exits with what that returns."""
     stricter = {"-E": sys.flags.ignore_environment, "-s": sys.flags.no_user_site}
     options = [option for option, chosen in stricter.items() if chosen]
     return [sys.executable, "-P", *options, _OWN, function, *words]

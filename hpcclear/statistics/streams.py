@@ -125,21 +125,9 @@ def merge(first: Summary, second: Summary) -> Summary:
 class Accumulator:
     """Takes the samples of a design as they finish, in any order, and keeps their statistics.
 
-    Parameters
-    ----------
-    total : int
-        Samples of the design, at least 1.
-    record : dtype
-        Type of their records.
-    block, bins : int
-        Samples a block, bins of each histogram.
-    on_block : callable, optional
-        Gets number and records (in index order) of every block that is complete; it may keep raw samples.
-
-    Attributes
-    ----------
-    edges : ndarray or None
-        Of the histograms: chosen from block 0, so that they are the same in every run.
+    Of `total` samples `block` make one; `on_block` gets number and records (in index order) of every block that is complete,
+    and may keep raw samples. `edges`: of the histograms of `bins` bins, chosen from block 0, so that they are the same in
+    every run.
     """
 
     def __init__(

@@ -101,21 +101,10 @@ times the largest difference of nine others in 4 % of cases, by more than 1.7 ti
 class Evaluator:
     """Simulates points of one scene as a stream: submit some, advance, submit more while others run.
 
-    Parameters
-    ----------
-    columns : Points
-        Points (perhaps none) whose names and paths all submitted values share.
-    lanes : int, optional
-        Samples of a batch.
-    perturbations : sequence of int, optional
-        In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
-        half-width, as `alone` gives those of a single response; none by default.
-    objective : Objective
-        Of which that half-width is.
-    recorder : Lanes, optional
-        By which samples are simulated, instead of lanes of its own.
-
-    Raises InputError if the scene requires what the kernel cannot do.
+    All submitted values share names and paths of the `columns`. `lanes`: samples of a batch; those of `recorder` replace its
+    own. `perturbations`, in units of `PERTURBATION`: of replicas at a tighter tolerance that run beside each sample and give
+    its `objective` a half-width, as `alone` gives those of a single response. Raises InputError if the scene requires what
+    the kernel cannot do.
     """
 
     def __init__(

@@ -12,10 +12,7 @@ from hpcclear.dynamics.linkage.kinematics import Kinematics
 class Acting:
     """The motion as one load sees it. Terms add, subtract, multiply and divide; places are ``body.point``.
 
-    Attributes
-    ----------
-    zero, one : Term
-        What is zero leaves no trace in the motion's source.
+    What is multiplied by `zero` leaves no trace in the motion's source.
     """
 
     zero, one = ZERO, ONE

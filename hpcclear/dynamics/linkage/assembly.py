@@ -119,12 +119,7 @@ def assemble_samples(
 ) -> tuple[Assembly, Booleans]:
     """`assemble` for so many samples at once, and which of them it succeeds with (m,): others may close from other angles.
 
-    Parameters
-    ----------
-    structure : Mechanism
-        What the samples have in common.
-    sample : Mechanism
-        With numbers of samples (m,), or single ones.
+    `structure` is what they have in common; `sample` has numbers of samples (m,), or single ones.
     """
     loops = Loops(structure, closed=True)
     loops.mechanism = sample = straight(sample)

@@ -36,16 +36,9 @@ def blocks(
 class Elimination:
     """The equations of one block, factored; `solve` takes right-hand sides.
 
-    Parameters
-    ----------
-    matrix : dict
-        Entries (i, j), both halves; zero where there is none.
-    block : list of int
-        Unknowns, the coordinates first; the last `held` of them are multipliers.
-    inverse : callable
-        A term's reciprocal, as a parameter where there is one.
-    passed : mapping of int to sequence of int
-        Multipliers whose pivots are kept from vanishing, each with the multipliers of its joint.
+    `matrix` has entries (i, j), both halves, none where they are zero. The coordinates come first in the `block`; its last
+    `held` unknowns are multipliers. `inverse`: a term's reciprocal, as a parameter where there is one. `passed`: multipliers
+    whose pivots are kept from vanishing, each with the multipliers of its joint.
     """
 
     def __init__(

@@ -26,12 +26,7 @@ RESERVED = (
 class MotionEquations:
     """Forces, mass matrix and constraints of a mechanism, and their solution, term by term.
 
-    Attributes
-    ----------
-    constraints : list of ClosureRow
-        What closes loops; to be set before they are solved.
-    losses : list of Term
-        Powers that contacts take, W.
+    `constraints` close loops, and are to be set before they are solved; `losses`: powers that contacts take, W.
     """
 
     constraints: list[ClosureRow]

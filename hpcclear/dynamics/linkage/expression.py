@@ -117,16 +117,9 @@ def onto(factor: Term, product: Term) -> Term:
 class Writer:
     """Statements of a text, in the order in which their values are first needed.
 
-    Parameters
-    ----------
-    rows : mapping of parameter name to row
-        Parameters with a row of their own, derived ones by their texts; others get the rows from `free` on.
-    free : int
-        First row of `par` that nobody has.
-    hoist : bool
-        Whether what holds parameters alone is worked out once a sample, as a derived parameter.
-    taken : iterable of str
-        Names that no value gets, whatever a load or drive is called.
+    `rows`: of parameters that have one, derived ones by their texts; others get the rows of `par` from `free` on. With
+    `hoist`, what holds parameters alone is worked out once a sample, as a derived parameter. No value gets a name that is
+    `taken`, whatever a load or drive is called.
     """
 
     def __init__(

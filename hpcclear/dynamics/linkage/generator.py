@@ -48,16 +48,10 @@ class Motion:
 def generate(
     mechanism: Mechanism, on: On, rows: Rows, *, cartesian: bool = False, hoist: bool = True
 ) -> Motion:
-    """The text of a mechanism's motion.
+    """The text of a mechanism's motion; a number that is zero in it is zero in every sample.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-        A number that is zero in it is zero in every sample.
-    cartesian : bool
-        Every body by itself, ideal joints and prescribed angles as constraints with feedback (paper eq. 11).
-    hoist : bool
-        Whether what holds parameters alone is worked out once a sample.
+    `cartesian`: every body by itself, ideal joints and prescribed angles as constraints with feedback (paper eq. 11);
+    `hoist`: what holds parameters alone is worked out once a sample.
     """
     return _Generator(mechanism, on, rows, cartesian, hoist).motion()
 

@@ -25,17 +25,8 @@ from hpcclear.dynamics.linkage.trees import Forest, forest
 class Linkage:
     """A mechanism's structure: what its texts hold and where. Numbers that are zero in it are zero in every sample.
 
-    Parameters
-    ----------
-    on : On
-        What all its texts have.
-    cartesian : bool
-        Every body by itself, with multipliers and feedback.
-    bristles : int
-        Of friction in the joints with clearance, whose coordinates come before the mechanism's.
-    places : tuple of int
-        Of the contacts among the kernel's, one behind the other.
-
+    `on`: what all its texts have; `cartesian`: every body by itself, with multipliers and feedback; `bristles`: of friction in
+    the joints with clearance, whose coordinates come before the mechanism's; `places`: of the contacts among the kernel's.
     Raises InputError if it needs more parameters than the kernel holds.
     """
 

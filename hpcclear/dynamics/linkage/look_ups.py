@@ -26,14 +26,9 @@ class LookUp(NamedTuple):
 
 
 class LookUps:
-    """Those of a mechanism's curves, and the parameters that they read besides those of its text.
+    """Those of a mechanism's curves (`found`, by their names), and the parameters that they read besides those of its text.
 
-    Attributes
-    ----------
-    found : dict
-        By the names of curves.
-    rows, read, inputs
-        As of `expression.Writer`.
+    `rows`, `read` and `inputs` are as of `expression.Writer`.
     """
 
     def __init__(self, forest: Forest, rows: Rows, text: Writer) -> None:

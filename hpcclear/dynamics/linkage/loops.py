@@ -92,14 +92,9 @@ class Loops:
     """Constraints of a mechanism's bodies, three coordinates each; `closed`: joints with clearance centred, torque drives at
     their initial speed. `trees`: those of the joints that close loops, in the coordinates of the trees.
 
-    Attributes
-    ----------
-    owners : tuple of str
-        Which joint or drive each row belongs to, "joints.NAME" or "drives.NAME".
-    scales : ndarray, shape (n,)
-        What a coordinate's unit step means: a typical length for x, y and along guides, 1 for angles.
-    row_scales : ndarray, shape (rows,)
-        What a constraint's unit error means, likewise.
+    `owners`: which joint or drive each row belongs to, "joints.NAME" or "drives.NAME"; `scales` (n,): what a coordinate's
+    unit step means, a typical length for x, y and along guides, 1 for angles; `row_scales` (rows,): a constraint's unit
+    error, likewise.
     """
 
     def __init__(self, mechanism: Mechanism, closed: bool = False, trees: bool = False) -> None:

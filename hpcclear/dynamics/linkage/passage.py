@@ -311,13 +311,7 @@ def _through(walker: _Walker, found: Passage, here: WalkPose, end: float) -> Wal
 def clear(loops: Loops, start: Array, seconds: Array, turns: int) -> Booleans:
     """Which samples (m,) turn once round without coming near a singular configuration, the others to be walked one by one.
 
-    Parameters
-    ----------
-    loops : Loops
-        Of the trees, with the samples' numbers.
-    start : ndarray, shape (n, m)
-    seconds : ndarray, shape (m,)
-        A revolution.
+    `loops`: of the trees, with the samples' numbers; `start` (n, m); `seconds` (m,): a revolution.
     """
     steps = 72 * turns
     h = seconds / steps

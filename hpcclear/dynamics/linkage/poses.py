@@ -31,12 +31,7 @@ class Pose(NamedTuple):
 class Poses:
     """Poses of all bodies and eccentricities of the joints with clearance, as a text read with arrays.
 
-    Parameters
-    ----------
-    rows : mapping of str to int
-        Rows of parameters that have one; `rows` of this object has those besides.
-    free : int
-        First row that nobody has.
+    `rows` has rows of parameters that are known, and afterwards those from `free` on besides.
     """
 
     def __init__(self, forest: Forest, rows: Mapping[str, int], free: int) -> None:
@@ -81,12 +76,7 @@ class Poses:
         """Poses, each (bodies, m), and eccentricities (contacts, 2, m): of a journal from the centre of its bearing, of a
         corner from the line of its guide.
 
-        Parameters
-        ----------
-        par : ndarray, shape (PARAMETERS,) or (m, PARAMETERS)
-        q, v : ndarray, shape (n, m)
-        time : float or ndarray, shape (m,)
-            s, since the start of the revolution.
+        `par` is (PARAMETERS,) or (m, PARAMETERS); `q`, `v` (n, m); `time` in s since the start of the revolution, one or (m,).
         """
         n = len(self.forest.coordinates)
         count = q.shape[-1] if n else np.size(time)
@@ -112,14 +102,8 @@ def _needed(kin: Kinematics, frame: str) -> Term:
 def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tuple[Array, Array]:
     """Coordinates and velocities (n,) of a forest, of a linkage put together; (n, m) of samples.
 
-    Journals stand where the assembly has them; a coordinate along a guide is read off the poses of both bodies.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Of the mechanism, or of `hpcclear.dynamics.linkage.mechanism.uncentred`.
-    mechanism : Mechanism
-        Where the mass centres are: single ones, or those of samples (m,).
+    Journals stand where the assembly (of the mechanism, or `uncentred`) has them; a coordinate along a guide is read off the
+    poses of both bodies. The mechanism says where the mass centres are: single ones, or those of samples (m,).
     """
     found: list[tuple[Number, Number]] = []
     for one in forest.coordinates:

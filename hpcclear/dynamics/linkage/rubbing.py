@@ -31,16 +31,10 @@ class Solving(Protocol):
 
 
 class Rubbing:
-    """Friction of one joint.
+    """Friction of one joint: `speed` of sliding, `size` of the reaction, and the `force` against the sliding.
 
-    Attributes
-    ----------
-    influence : dict
-        Derivatives by columns of the sliding that friction acts against.
-    reaction : list of (Term, dict)
-        Components of the reaction: what needs no unknown, and factors of the unknowns.
-    speed, size, force : Term
-        Sliding speed, size of the reaction, and friction against the sliding.
+    `influence`: derivatives by columns of the sliding that friction acts against; `reaction`: components, each what needs no
+    unknown, and factors of the unknowns.
     """
 
     ratio: Term
@@ -114,13 +108,7 @@ class Rubbing:
 
 
 class RubbingGuide(Rubbing):
-    """Friction of a guide.
-
-    Attributes
-    ----------
-    place : int
-        The unknown that holds the guide: its slider's coordinate, or the multiplier across it.
-    """
+    """Friction of a guide; `place`: the unknown that holds it, its slider's coordinate or the multiplier across it."""
 
     def __init__(self, joint: Joint, of: Solving) -> None:
         super().__init__(joint, of)

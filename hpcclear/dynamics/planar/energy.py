@@ -17,23 +17,11 @@ from hpcclear.scene import Scene
 def energies(
     scene: Scene, par: Array, q: Array, v: Array, active: Array, turn_time: Array | float = 0.0
 ) -> tuple[Array, Array]:
-    """Kinetic energy, and all energy: kinetic, potential and stored in the contacts.
+    """Kinetic energy, and all energy: kinetic, potential and stored in the contacts, J, (m,) each.
 
-    Parameters
-    ----------
-    par : ndarray, shape (PARAMETERS,) or (m, PARAMETERS)
-        Kernel parameters, of one sample or a row for each state.
-    q, v : ndarray, shape (n, m)
-        The kernel's coordinates and velocities in any formulation.
-    active : ndarray, shape (m, MAX_JOINTS)
-        Contact flags of the joints.
-    turn_time : ndarray, shape (m,), optional
-        s, since the start of the revolution: gives the crank angle where it is no coordinate.
-
-    Returns
-    -------
-    tuple of ndarray, shape (m,)
-        J.
+    `par` is (PARAMETERS,), of one sample, or (m, PARAMETERS); `q`, `v` (n, m) are the kernel's coordinates and velocities in
+    any formulation; `active` (m, MAX_JOINTS): contact flags. `turn_time`, s since the start of the revolution, (m,), gives
+    the crank angle where it is no coordinate.
     """
     q, v = q[scene.bristles :], v[scene.bristles :]
     linkage, places = linkage_of(scene), list(scene.open_places)
@@ -99,21 +87,9 @@ def of_starts(scene: Scene, par: Array, start: Start, n: int) -> Array:
 
 
 def errors(scene: Scene, par: Array, before: Array, outcome: Outcome, n: int) -> Array:
-    """What the balance leaves unexplained at the end, over max(kinetic energy, integral of |driving power|).
+    """What the balance leaves unexplained at the end (m,), over max(kinetic energy, integral of |driving power|).
 
-    Parameters
-    ----------
-    par : ndarray, shape (m, PARAMETERS)
-    before : ndarray, shape (m,)
-        Energy at the start, J.
-    outcome : Outcome
-        Of m samples, with the energy balance on.
-    n : int
-        Coordinates.
-
-    Returns
-    -------
-    ndarray, shape (m,)
+    `par` (m, PARAMETERS); `before` (m,): energy at the start, J; `outcome`: with the energy balance on; `n`: coordinates.
     """
     q, v = outcome.coordinates(n).T, outcome.velocities(n).T
     kinetic, after = energies(scene, par, q, v, outcome.active)

@@ -32,16 +32,8 @@ def followed(
 ) -> dict[str, Array]:
     """Series of the followed point, none where none is followed: place, acceleration (t,) and `path_error`.
 
-    Parameters
-    ----------
-    phase : ndarray, shape (t,)
-        Progress of the drive since the start, 2 pi a turn of its body, rad.
-    points : dict
-        ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
-    acceleration : ndarray of complex, shape (t,)
-        Of the point, x + iy.
-    clearance : bool
-        Whether there is any, or no path is off.
+    `phase` (t,): progress of the drive since the start, 2 pi a turn of its body, rad; `points`: ``point_x`` and ``point_y``
+    (t, points); `acceleration` (t,): of the point, x + iy. Without `clearance` no path is off.
     """
     place, mechanism = scene.linkage.followed, linkage_of(scene).mechanism
     if place is None:

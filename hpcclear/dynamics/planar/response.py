@@ -122,14 +122,8 @@ def moved(
 ) -> dict[str, Array]:  # fmt: skip
     """Series of the drive, the bodies and the followed point; of a template's parts by the names that it has for them.
 
-    Parameters
-    ----------
-    places : dict
-        As `bodies_and_points` has them.
-    phase, acceleration : ndarray, shape (t,)
-        rad and m/s2, as `path.followed` takes them; the acceleration of a guided body is that along its guide.
-    clearance : bool
-        As `path.followed` takes it.
+    `places` as `bodies_and_points` has them, the others as `path.followed` takes them; the acceleration (m/s2) of a guided
+    body is that along its guide.
     """
     k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
     angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))

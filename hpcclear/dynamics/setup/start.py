@@ -81,12 +81,7 @@ def _assembled(scene: Scene) -> Assembly:
 class Samples:
     """Samples of a scene (m), put together: all at once, and one by one those that do not close from the rough angles.
 
-    Attributes
-    ----------
-    numbers : Mechanism
-        With numbers of samples (m,).
-    closed : ndarray, shape (m,)
-        Which of them close.
+    `numbers`: the mechanism with those of samples (m,); `closed` (m,): which of them close.
     """
 
     def __init__(self, scene: Scene, points: Points) -> None:

@@ -32,21 +32,11 @@ NO_LIMIT = 1 << 40  # of block steps in a call
 
 
 class Lanes:
-    """W lanes and a queue of samples.
+    """W lanes and a queue of samples; W is 1 for a single response.
 
-    Parameters
-    ----------
-    width : int
-        Lanes; 1 for a single response.
-    record : numpy.ndarray, optional
-        Buffer (rows, columns) for every accepted step of the first samples of the queue, which run in the first lanes.
-    observed : Effects, optional
-        With which the same motion is run a second time while these samples are recorded, for their works and what `observe`
-        returns. No other number depends on it.
-    kept : int
-        How many samples are recorded.
-
-    Raises ValueError if the problem's coordinates do not fit the stepper.
+    `record`: buffer (rows, columns) for every accepted step of the first `kept` samples, which run in the first lanes.
+    `observed`: effects with which the same motion is run a second time while these are recorded, for their works and what
+    `observe` returns; no other number depends on it. Raises ValueError if the problem's coordinates do not fit the stepper.
     """
 
     def __init__(

@@ -105,13 +105,8 @@ def first_passed(
 ) -> tuple[float, str]:
     """Revolutions at which a life first passes a limit, and its name; infinite and "" where it passes none.
 
-    Parameters
-    ----------
-    limits : mapping
-        "clearance" (of the largest around any joint, m), "peak_contact_force" (N), "objective" (SI); each life has that of
-        a bearing worn through besides, `THROUGH`.
-    since : int
-        Number of the first jump that is looked at.
+    `limits`: "clearance" (of the largest around any joint, m), "peak_contact_force" (N), "objective" (SI); each life has that
+    of a bearing worn through besides, `THROUGH`. `since`: number of the first jump that is looked at.
     """
     at = [node.cycle for node in found.nodes]
     if not at:

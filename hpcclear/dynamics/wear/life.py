@@ -104,11 +104,7 @@ State = tuple[float, Array, Array]
 def life(joints: Joints, plan: LifePlan, relief: Relief = FLAT) -> Asking:
     """Follow one life; yields what is to be simulated, is sent what came of it, returns the `Life`.
 
-    Parameters
-    ----------
-    joints : Joints, arrays (joints,)
-    relief : Relief
-        What profiles are made of; by default surfaces wear evenly.
+    `relief`: what profiles are made of; by default surfaces wear evenly.
     """
     nothing = np.zeros(len(joints.clearance))
     found = Life(nodes=[], limit=nothing, error=nothing)

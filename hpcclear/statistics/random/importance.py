@@ -72,12 +72,7 @@ meets none. By a lower level a bound of p takes `ENOUGH` draws of about p / 2; b
 class Density:
     """A mixture of the inputs' own density, a wide one and fitted ones; of their own one alone if none is fitted.
 
-    Parameters
-    ----------
-    shares : array, shape (k,)
-        Of the fitted ones, of sum 1.
-    centres : array, shape (k, d)
-    covariances : array, shape (k, d, d)
+    `shares` (k,): of the fitted ones, of sum 1, with `centres` (k, d) and `covariances` (k, d, d).
     """
 
     def __init__(self, shares: Array, centres: Array, covariances: Array) -> None:
@@ -201,14 +196,8 @@ def _little(weights: Array, failing: Array) -> bool:
 class Rare:
     """A probability of exceeding a limit in the making.
 
-    Attributes
-    ----------
-    negligible : float
-        A probability below which its upper limit is enough.
-    before : (int, int)
-        Failures of earlier plain draws, and their number; they count with plain ones.
-    f, weights : array, shape (REPEATS, n)
-        All draws of the repeats so far.
+    `negligible`: a probability below which its upper limit is enough; `before`: failures of earlier plain draws, and their
+    number, which count with plain ones; `f`, `weights` (REPEATS, n): all draws of the repeats so far.
     """
 
     dimensions: int

@@ -47,22 +47,10 @@ class SampledMoments:
 
 
 def sample_moments(values: np.ndarray) -> SampledMoments:
-    """Mean and standard deviation of independent samples, with standard errors.
+    """Mean and standard deviation, with standard errors, of s independent samples of each of n quantities, (n, s).
 
-    Parameters
-    ----------
-    values : (n, s) array
-        s samples of each of n quantities.
-
-    Raises
-    ------
-    InputError
-        Fewer than four samples.
-
-    Notes
-    -----
     The variance of the variance estimate is (m4 - s^4 (s - 3) / (s - 1)) / s, m4 the fourth central
-    moment; that of the standard deviation follows to first order.
+    moment; that of the standard deviation follows to first order. Raises InputError for fewer than four samples.
     """
     count = values.shape[1]
     if count < 4:
@@ -80,29 +68,15 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
 class RobustObjective:
     """Mean and standard deviation of a surrogate under random inputs, for whole swarms of designs.
 
-    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and standard deviation, in the unit of the
-    surrogate. The result of a design does not depend on the others in the call.
+    Called with designs ``(n, k)``, columns in the order of `design_names`, it returns ``(n, 2)``: mean and standard deviation,
+    in the unit of the surrogate. The result of a design does not depend on the others in the call.
 
-    Parameters
-    ----------
-    design_names : sequence of str
-        Names of the design variables, in the order of their columns.
-    fixed : mapping of str to float, optional
-        Values of inputs that are neither.
-    derived : sequence of DerivedInput, optional
-        Model inputs that are computed from design variables and random inputs.
-    probes : (m, k) array, optional
-        Designs at which the nodes of derived inputs are chosen; spread them over the design space.
-        Needed only where a derived input depends on a random one.
-    tolerance : float
-        Absolute error allowed in the integral of any kernel (at most 1) over one random input.
-    draws : (int, numpy Generator) or callable, optional
-        Monte Carlo in place of quadrature: how many draws, and what makes them; or a function of designs (n, k) that returns
-        draws (n or 1, s) of each random input, which may vary together then. Designs that see the same ones are ranked without
-        noise.
-    joint : callable, optional
-        Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
-        array (count,).
+    `fixed`: values of inputs that are neither varied nor random; `derived`: model inputs that are computed from both. The
+    nodes of derived inputs that depend on a random one are chosen at the designs `probes` (m, k): spread them over the design
+    space. `tolerance`: absolute error allowed in the integral of any kernel (at most 1) over one random input. `draws`: Monte
+    Carlo in place of quadrature: how many draws, and what makes them; or a function of designs (n, k) that returns draws (n
+    or 1, s) of each random input, which may vary together then. Designs that see the same ones are ranked without noise.
+    `joint`: of inputs that vary together, independent draws (count,) of them all.
 
     Raises InputError: a random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
     support that leaves the surrogate's domain.

@@ -19,19 +19,9 @@ SIZES = np.geomspace(1e-3, 1e3, 37)
 
 
 def together(values: Array, errors: Array, typical: float) -> tuple[Array, Array]:
-    """Estimates of each of n numbers by all of them, and their standard errors.
+    """Estimates of each of n numbers by all of them, and their standard errors; all NaN where nothing is known.
 
-    Parameters
-    ----------
-    values, errors : array, shape (n,)
-        Estimates and standard errors; where one of them is NaN, only the others are known of that number.
-    typical : float
-        How large such numbers are as a rule.
-
-    Returns
-    -------
-    two arrays, shape (n,)
-        All NaN where nothing is known.
+    Where a value or its error is NaN, only the others are known of that number. `typical`: how large they are as a rule.
     """
     known = np.isfinite(values) & np.isfinite(errors)
     if not known.any():

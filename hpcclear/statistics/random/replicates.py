@@ -88,17 +88,9 @@ def spread(shifts: Array) -> Array:
 
 
 def moments(values: Array) -> tuple[Estimate, Deviation]:
-    """Mean and standard deviation, free of bias to the order of their errors.
+    """Mean and standard deviation, free of bias to the order of their errors, of s values of each of r replicates, (r, s).
 
-    Parameters
-    ----------
-    values : array, shape (r, s)
-        s values of each of r replicates; NaN where a simulation failed, which is left out.
-
-    Returns
-    -------
-    `Estimate`, `Deviation`
-        All NaN where fewer than `FEWEST` values or replicates are left.
+    A failed simulation is NaN and left out; all is NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
@@ -136,22 +128,10 @@ class Limited(Estimate):
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:
-    """A quantile and its confidence interval: that of its order, converted into values (Woodruff 1952).
+    """A quantile (`order`: probability of staying below) and its confidence interval: that of its order, converted into values
+    (Woodruff 1952). Values as in `moments`.
 
-    Parameters
-    ----------
-    values : array, shape (r, s)
-        As in `moments`.
-    order : float
-        Probability of staying below.
-    confidence : float
-        Confidence level.
-
-    Returns
-    -------
-    Limited
-        Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur);
-        all NaN where fewer than `FEWEST` values or replicates are left.
+    Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur).
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
@@ -171,19 +151,8 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
 
 
 def exceedance(values: Array, limit: float, confidence: float) -> Limited:
-    """Probability of lying above `limit`; its interval is that of as many independent draws as have its error (Korn, Graubard).
-
-    Parameters
-    ----------
-    values : array, shape (r, s)
-        As in `moments`.
-    confidence : float
-        Level of the interval.
-
-    Returns
-    -------
-    Limited
-        Within [0, 1]; all NaN where fewer than `FEWEST` values or replicates are left.
+    """Probability of lying above `limit`, within [0, 1]; its interval is that of as many independent draws as have its error
+    (Korn, Graubard). Values as in `moments`.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
@@ -221,17 +190,10 @@ def _interval_of_share(
 
 
 def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:
-    """Whether number i is significantly less than number j, (n, n); False where it is undecided.
+    """Whether number i is significantly less than number j, (n, n); False where it is undecided, each comparison two-sided.
 
-    Replicates are paired: designs that meet the same scatter differ by less than their own errors.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-    shifts : array, shape (n, r)
-        Of `Estimate`, of all numbers from the same replicates.
-    confidence : float
-        Level of each comparison, two-sided.
+    Replicates are paired: designs that meet the same scatter differ by less than their own errors. `shifts` (n, r): of
+    `Estimate`, of all numbers from the same replicates.
     """
     error = np.array([spread(row - shifts) for row in shifts])
     reach = student(confidence, shifts.shape[1] - 1) * error

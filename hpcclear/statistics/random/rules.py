@@ -122,25 +122,11 @@ def legendre(count: int) -> Rule:
 
 
 def nodes_needed(law: Quantiles, length: float, tolerance: float, most: int) -> int:
-    """Fewest nodes that integrate every kernel, and every product of two, to `tolerance`.
+    """Fewest nodes that integrate every kernel, and every product of two, to `tolerance`; 0 if `most` nodes are not enough.
 
     Second moments need the product of two kernels of length scale l, which is one of l / sqrt(2)
     about the middle of their centres (times a factor <= 1): so that narrower kernel is tested, with
-    its centre all over the support and three length scales beyond.
-
-    Parameters
-    ----------
-    length : float
-        Length scale, in the unit of the law.
-    tolerance : float
-        Absolute; the kernel itself is at most 1.
-    most : int
-        Where to give up.
-
-    Returns
-    -------
-    int
-        0 if `most` nodes are not enough.
+    its centre all over the support and three length scales beyond. The tolerance is absolute; the kernel itself is at most 1.
     """
     narrow = length / sqrt(2)
     low, high = law.span

@@ -15,18 +15,9 @@ CONFIDENCE = 0.95
 def share_interval(
     hits: ArrayLike, draws: ArrayLike, confidence: float = CONFIDENCE
 ) -> tuple[Array, Array]:
-    """Return Clopper and Pearson's confidence interval of a probability; 0 and 1 without draws.
+    """Clopper and Pearson's two-sided confidence interval of a probability; 0 and 1 without draws. Arrays of any shape.
 
-    Parameters
-    ----------
-    hits, draws : array_like of any shape
-        Independent draws, `hits` of which met the event; neither need be whole.
-    confidence : float
-        Two-sided.
-
-    Returns
-    -------
-    lower, upper : arrays of the shape of `hits`
+    Of so many independent `draws`, `hits` met the event; neither need be whole.
     """
     from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
 
@@ -64,20 +55,12 @@ def rank_correlation(first: Array, second: Array) -> float:
 
 
 def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
-    """95 % confidence intervals of a quantile of independent values, by their order alone; NaN where too few values are known.
+    """95 % confidence interval of a quantile of independent, finite values (n,), by their order alone; NaN where too few are
+    known.
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Finite, of any distribution.
-    level : float
-        Probability of staying below, strictly between 0 and 1.
-    unknown : int
-        Further values of which nothing is known, such as failed simulations: the interval holds wherever these lie.
-
-    References
-    ----------
-    H. A. David and H. N. Nagaraja, "Order Statistics" (2003), section 7.1, doi:10.1002/0471722162.
+    `level`: probability of staying below, strictly between 0 and 1. The interval holds wherever `unknown` further values lie,
+    such as those of failed simulations.
+    Source: H. A. David and H. N. Nagaraja, "Order Statistics" (2003), section 7.1, doi:10.1002/0471722162.
     """
     from scipy.special import bdtr
 

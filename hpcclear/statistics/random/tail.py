@@ -25,17 +25,9 @@ ALL = 3.0
 
 
 def index(values: Array, limit: float) -> Array:
-    """Reliability index of staying at or below a limit.
+    """Reliability indices (k,) of staying at or below a limit, of n values of each of k random numbers (k, n).
 
-    Parameters
-    ----------
-    values : array, shape (k, n)
-        n values of each of k random numbers.
-
-    Returns
-    -------
-    array, shape (k,)
-        Larger is safer, within -`MOST` and `MOST`.
+    Larger is safer, within -`MOST` and `MOST`.
     """
     ranked = np.sort(values, axis=1)
     below = (ranked <= limit).sum(axis=1)
@@ -47,19 +39,10 @@ def index(values: Array, limit: float) -> Array:
 
 
 def beyond(values: Array, limit: float) -> Array:
-    """How far even the lowest values of random numbers lie above a limit, over the limit; 0 where some of them do not.
+    """How far even the lowest values of random numbers (k, n) lie above a limit, over the limit, (k,); 0 where some do not.
 
     Where all values exceed the limit their share says no more, and the index mixes their distance with their scatter: of two
     such numbers the one nearer to the limit is better. The lowest value is that of the index -`ALL`.
-
-    Parameters
-    ----------
-    values : array, shape (k, n)
-        As in `index`.
-
-    Returns
-    -------
-    array, shape (k,)
     """
     middle, level, rise = _line(np.sort(values, axis=1), np.zeros(len(values), int))
     lowest = level + (-ALL - middle) * rise

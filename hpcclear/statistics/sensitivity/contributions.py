@@ -32,17 +32,10 @@ FEWEST = 4
 class Contributions:
     """Of the inputs of one design; all NaN where there are too few values, 0 where f does not scatter.
 
-    Attributes
-    ----------
-    share, share_error : array, shape (inputs,)
-        Of the variance of f; inputs of one group have the same number, which is that of the group.
-    halved, halved_error : array, shape (inputs,)
-        By how much the standard deviation of f falls with half the scatter of an input, over it.
-    together : callable
-        From several inputs to this fall with the scatter of all of them halved at once, and its error. It does not follow
-        from single ones: correlations and interactions count.
-    rest, rest_error : float
-        Share of the variance that no input explains by the fit.
+    `share` (inputs,): of the variance of f; inputs of one group have the same number, which is that of the group. `halved`
+    (inputs,): by how much the standard deviation of f falls with half the scatter of an input, over it. `together`: from
+    several inputs to this fall with the scatter of all of them halved at once, and its error; it does not follow from single
+    ones, since correlations and interactions count. `rest`: share of the variance that no input explains by the fit.
     """
 
     share: Array
@@ -55,16 +48,9 @@ class Contributions:
 
 
 def contributions(inputs: Array, f: Array, groups: Sequence[int]) -> Contributions:
-    """Contributions of inputs to the variance of f.
+    """Contributions to the variance of f (r, n) of inputs (r, n, d): n points of each of r replicates.
 
-    Parameters
-    ----------
-    inputs : array, shape (r, n, d)
-        n points of each of r replicates.
-    f : array, shape (r, n)
-        NaN where a simulation failed.
-    groups : sequence of int, length d
-        Inputs of one number vary together.
+    Failed simulations are NaN in f; inputs of one number in `groups` (d of them) vary together.
     """
     size, good = inputs.shape[2], np.isfinite(f)
     terms = _terms(size)

@@ -93,19 +93,8 @@ def design_intervals(
 ) -> IntervalDesign:
     """Lay out the samples of every interval at every clearance.
 
-    Parameters
-    ----------
-    bounds : array_like, shape (d, 2)
-        The global interval of every variable, in its own unit.
-    clearances : array_like, shape (c,)
-    sample : callable
-        ``sample(n, bounds, rng)`` -> points of shape (n, d).
-
-    Returns
-    -------
-    IntervalDesign
-
-    Raises InputError: there would be too few points for a standard error.
+    `bounds` (d, 2): the global interval of every variable, in its own unit; `sample`: ``sample(n, bounds, rng)`` -> points
+    (n, d). Raises InputError: there would be too few points for a standard error.
     """
     limits, gaps = np.asarray(bounds, float), np.asarray(clearances, float)
     needed = settings.needed(len(limits))
@@ -134,17 +123,8 @@ def design_intervals(
 def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityHistory:
     """Fit a surface for every interval and clearance and take its midpoint derivatives (eq. 14).
 
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        f at `design.points`; those that are not finite are failed simulations, counted in `failed`.
-        A surface left with too few points is NaN in the history.
-
-    Returns
-    -------
-    SensitivityHistory
-
-    Raises InputError if no surface at all can be fitted.
+    `values` (n,): f at `design.points`; those that are not finite are failed simulations, counted in `failed`. A surface left
+    with too few points is NaN in the history. Raises InputError if no surface at all can be fitted.
     """
     steps, n_variables, _ = design.intervals.shape
     shape = steps, len(design.clearances)

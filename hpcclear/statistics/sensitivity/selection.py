@@ -63,24 +63,10 @@ def select_influential(
 ) -> Selection:
     """Rank the variables and select those with great influence (rule: module text).
 
-    Parameters
-    ----------
-    names : sequence of str, length m
-        Variable of each column; a name may come more than once.
-    sensitivity, standard_error : array_like, shape (c, m)
-        Derivatives at each clearance, in units of f per unit of the variable; NaN for no estimate.
-    lengths : array_like, shape (m,)
-        Lengths of the global intervals, in the unit of each variable.
-    fraction : float
-        Of the largest effect, in (0, 1].
-    confidence : float
-        Two-sided, of each comparison, in (0, 1).
-    share : float
-        Of the clearances, in (0, 1].
-
-    Returns
-    -------
-    Selection
+    `names`: variable of each of m columns, a name may come more than once; `sensitivity` (c, m): derivatives at each
+    clearance, in units of f per unit of the variable, NaN for no estimate; `lengths` (m,): of the global intervals, in the
+    unit of each variable. `fraction`: of the largest effect, `share`: of the clearances, both in (0, 1]; each comparison is
+    two-sided.
     """
     slope, error = np.asarray(sensitivity, float), np.asarray(standard_error, float)
     length = np.asarray(lengths, float)

@@ -60,34 +60,12 @@ def fit_kriging(
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
-    Parameters
-    ----------
-    points : (n, d) array
-        Inputs, all inside `bounds`.
-    values : (n,) array
-        Outcomes; NaN marks a failed sample, which is left out and counted.
-    bounds : (d, 2) array
-        Lower and upper limit of each input: where the model will answer.
-    rng : numpy Generator
-        Draws the optimiser's further starting points.
-    names : sequence of str, optional
-        Names of the inputs, for messages and files (default x1, x2, ...).
-    restarts : int
-        Starting points of the likelihood's maximisation besides the first.
-    lengths : (float, float)
-        Between which the length scales are, in the unit cube.
-    kernel : str
-        "squared-exponential" or "matern-5/2".
-    noise : (float, float), optional
-        Between which the noise variance is, in units of the variance of the values.
-    shares : (n,) array, optional
-        Noise variance of each value over that one, where the errors of values are known; else they are all alike.
-
-    Returns
-    -------
-    Kriging
-
-    Raises InputError: points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
+    The points (n, d) are inside `bounds` (d, 2), where the model will answer. A value that is NaN marks a failed sample,
+    which is left out and counted. `names`: of the inputs, x1, x2 and so on by default. The likelihood is maximised from
+    `restarts` starting points besides the first, drawn by `rng`, with length scales (in the unit cube) between `lengths`, and
+    the noise variance, in units of the variance of the values, between those of `noise`. `shares` (n,): noise variance of
+    each value over that one, where the errors of values are known; else they are all alike. Raises InputError: points outside
+    the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     from threadpoolctl import threadpool_limits
 

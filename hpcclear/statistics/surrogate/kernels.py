@@ -30,22 +30,12 @@ def correlation(squares: Array, kernel: Kernel) -> Array:
 
 
 def with_slopes(exponents: Array, level: float, kernel: Kernel) -> tuple[Array, Array]:
-    """Covariances and what their derivatives by the length scales are made of.
+    """Covariances (n, n) and what their derivatives by the length scales are made of (n, n); one array for the squared
+    exponential.
 
     The derivative by the logarithm of a length scale is the second array times the squared difference of that input over its
-    length scale.
-
-    Parameters
-    ----------
-    exponents : array, shape (n, n)
-        Minus half the squared distances, plus `level` for the squared exponential; overwritten.
-    level : float
-        Logarithm of the variance.
-
-    Returns
-    -------
-    (array, array)
-        Both of shape (n, n); for the squared exponential they are one.
+    length scale. `exponents` (n, n), overwritten: minus half the squared distances, plus `level`, the logarithm of the
+    variance, for the squared exponential.
     """
     if kernel == SQUARED_EXPONENTIAL:
         np.minimum(exponents, level, out=exponents)

@@ -39,16 +39,8 @@ LONGEST = 1.0
 
 @dataclass(frozen=True)
 class Fitted:
-    """What maximises the likelihood.
-
-    Attributes
-    ----------
-    length_scales : array, shape (d,)
-        In the unit cube.
-    signal_variance, noise_variance : float
-        In units of the variance of the values.
-    alpha : array, shape (n,)
-        ``K^-1 values``, noise in K.
+    """What maximises the likelihood: length scales (d,) in the unit cube, variances over that of the values, and `alpha` (n,),
+    ``K^-1 values``, noise in K.
     """
 
     length_scales: Array
@@ -68,24 +60,11 @@ def maximise(
     kernel: Kernel = SQUARED_EXPONENTIAL,
     shares: Array | float = 1.0,
 ) -> Fitted:
-    """The most likely signal variance, length scales and noise variance of values at points.
+    """The most likely signal variance, length scales and noise variance of values (n,) of mean 0 at points (n, d) in the unit
+    cube.
 
-    Parameters
-    ----------
-    unit : array, shape (n, d)
-        Points in the unit cube.
-    values : array, shape (n,)
-        Of mean 0.
-    start : array, shape (d + 2,)
-        Signal variance, length scales, noise variance from which the search begins.
-    bounds : array, shape (d + 2, 2)
-        Their bounds.
-    restarts : int
-        Further starts.
-    seed : int
-        Of these.
-    shares : array, shape (n,)
-        Noise variance of each value over the one that is sought.
+    The search begins from `start` (d + 2,), in this order, and from further `restarts` by the seed, within `bounds` (d + 2,
+    2). `shares` (n,): noise variance of each value over the one that is sought.
     """
     shares = np.broadcast_to(shares, len(values))
     centred, limits = unit - 0.5, np.log(bounds)
@@ -155,22 +134,10 @@ def negative_likelihood(
     kernel: Kernel = SQUARED_EXPONENTIAL,
     shares: Array | float = 1.0,
 ) -> tuple[float, Array]:
-    """Minus the log likelihood, and its gradient.
+    """Minus the log likelihood, and its gradient (d + 2,); infinite, and 0, where the covariance matrix cannot be factored.
 
-    Parameters
-    ----------
-    theta : array, shape (d + 2,)
-        Logarithms of signal variance, length scales and noise variance.
-    centred : array, shape (n, d)
-        Points.
-    values : array, shape (n,)
-    shares : array, shape (n,)
-        As `maximise` takes them.
-
-    Returns
-    -------
-    (float, array of shape (d + 2,))
-        Infinite, and 0, where the covariance matrix cannot be factored.
+    `theta` (d + 2,): logarithms of signal variance, length scales and noise variance; `centred` (n, d): points; `values` and
+    `shares` (n,): as `maximise` takes them.
     """
     noise, count = np.exp(theta[-1]), len(values)
     level = theta[0] if kernel == SQUARED_EXPONENTIAL else 0.0

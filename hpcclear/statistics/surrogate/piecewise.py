@@ -19,16 +19,10 @@ Leaf = Kriging | Regression
 
 @dataclass(frozen=True, eq=False)
 class Piecewise:
-    """Models of one kind on boxes that tile a domain.
+    """Models of one kind on boxes that tile a domain, all with the same names.
 
-    Attributes
-    ----------
-    leaves : tuple of Leaf
-        One model a box, all with the same names.
-    r2, rmae : (l,) arrays
-        Accuracy of each on its own test points (NaN where the test values do not vary).
-    accepted : (l,) array of bool
-        Whether it met the targets; a False is the best within the allowed number of pieces.
+    `r2`, `rmae`: accuracy of each on its own test points (NaN where the test values do not vary); `accepted`: whether it met
+    the targets, a False is the best within the allowed number of pieces; (leaves,) each.
     """
 
     leaves: tuple[Leaf, ...]

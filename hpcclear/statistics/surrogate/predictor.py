@@ -71,24 +71,10 @@ def _dot(a: Array, b: Array) -> float:
 
 @cached
 def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
-    """Kriging means ``level + sum_i weights_i k(x, x_i)``.
+    """Kriging means ``level + sum_i weights_i k(x, x_i)`` at places (n, d) in the unit cube, (n,).
 
-    Parameters
-    ----------
-    unit : (n, d) array
-        Places in the unit cube.
-    scaled : (d, p) array
-        Training points in the unit cube over `lengths`, padded (`pad`).
-    lengths : (d,) array
-        Length scales in the unit cube.
-    weights : (p,) array
-        Weights of the training points in the units of the answer.
-    level : float
-        What is added to the sum.
-
-    Returns
-    -------
-    (n,) array
+    `scaled` (d, p): training points in the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,):
+    in the units of the answer.
     """
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
@@ -157,34 +143,17 @@ def tensor_moments(
     places: Array, shares: Array, counts: Integers, starts: Integers, dims: Integers, steady: Array, steady_shares: Array,
     scaled: Array, lengths: Array,
 ) -> Array:  # fmt: skip
-    """Mean and variance of ``sum_i weights_i k(x, x_i)`` over tensor rules, one rule a design.
+    """Mean and variance (n, 2) of ``sum_i weights_i k(x, x_i)`` over tensor rules, one rule a design.
 
     The kernel is a product over groups of inputs, so a rule of N1 x N2 x ... nodes needs only
     N1 + N2 + ... kernel rows; the tensor is formed by multiplying rows and ends in dot products.
     What does not move with the design comes ready-made in `steady`.
 
-    Parameters
-    ----------
-    places : (n, r) array
-        In the unit cube: for each group, for each of its nodes, the group's coordinates.
-    shares : (n, s) array
-        Probability of each node of each group; each group's add up to 1.
-    counts : (g,) array of int
-        Nodes of each group (their sum is s).
-    starts, dims : (g + 1,) and (starts[-1],) arrays of int
-        Group k holds the inputs ``dims[starts[k] : starts[k + 1]]``.
-    steady : (q, p) array
-        Weights of the training points times the kernel rows of the q steady nodes (padded to
-        a multiple of 4).
-    steady_shares : (q,) array
-        Their probabilities (0 for padding).
-    scaled, lengths
-        As in `kernel_sum`.
-
-    Returns
-    -------
-    (n, 2) array
-        Mean and variance.
+    `places` (n, r), in the unit cube: for each group, for each of its nodes, the group's coordinates; `shares` (n, s):
+    probability of each node of each group, each group's add up to 1; `counts` (g,): nodes of each group, of sum s. Group k
+    holds the inputs ``dims[starts[k] : starts[k + 1]]``. `steady` (q, p): weights of the training points times the kernel
+    rows of the q steady nodes (padded to a multiple of 4); `steady_shares` (q,): their probabilities (0 for padding). Others
+    as in `kernel_sum`.
     """
     groups, size, still = counts.size, scaled.shape[1], steady.shape[0]
     table, stack = np.empty((counts.sum(), size)), np.empty((groups, size))

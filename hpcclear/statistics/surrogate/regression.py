@@ -38,17 +38,12 @@ PREDICTED: tuple[str, ...] = ("left_out", "fitted")
 
 @dataclass(frozen=True)
 class RegressionMethod:
-    """A regressor as a kind of surrogate.
+    """A regressor as a kind of surrogate; `label` is what it is called.
 
-    Attributes
-    ----------
-    source : object
-        A class or a function that needs no arguments, or an object that is copied for each fit. What it makes has
-        ``fit(X, y)`` and ``predict(X)``, X of shape (n, d), y of shape (n,); it may have ``moments(X)``, for X of shape
-        (n, s, d) mean and standard deviation over the s equally likely points of each of n designs, shape (n, 2). A
-        `random_state` that is None is set, as scikit-learn's `set_params` does, or as an argument of that name.
-    label : str
-        What it is called.
+    `source`: a class or a function that needs no arguments, or an object that is copied for each fit. What it makes has
+    ``fit(X, y)`` and ``predict(X)``, X of shape (n, d), y of shape (n,); it may have ``moments(X)``, for X of shape
+    (n, s, d) mean and standard deviation over the s equally likely points of each of n designs, shape (n, 2). A
+    `random_state` that is None is set, as scikit-learn's `set_params` does, or as an argument of that name.
     """
 
     source: object
@@ -92,19 +87,10 @@ class RegressionMethod:
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """A regressor fitted in a box; without a source it only knows what was stored.
+    """A regressor fitted in the box from `lower` to `upper` (d,); without a source it only knows what was stored.
 
-    Attributes
-    ----------
-    names, lower, upper, inputs, values, dropped, label
-        Of the inputs (d,), the corners of the box (d,), the training points (n, d) and their values (n,), failed samples that
-        were left out, and what it is called.
-    seed : int
-        Of the regressor's own random numbers.
-    source : object
-        Of `RegressionMethod`.
-    stored : mapping of str to array
-        `PREDICTED`, shape (n,).
+    `inputs` (n, d), `values` (n,): training points, without the failed samples that were `dropped`; `seed`: of the
+    regressor's own random numbers; `source`: of `RegressionMethod`; `stored`: `PREDICTED` (n,).
     """
 
     names: tuple[str, ...]

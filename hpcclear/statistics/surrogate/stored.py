@@ -19,10 +19,7 @@ def rows_of(
 ) -> dict[str, np.ndarray]:
     """Variables of a dataset for models of one kind, in inputs of these names; `columns`: by default what a file holds.
 
-    Returns
-    -------
-    dict of arrays
-        The first dimension is the model; behind it the training point, the parameter, or none.
+    The first dimension is the model; behind it the training point, the parameter, or none.
     """
     points = max(len(leaf.values) for leaf in leaves)
     shapes = {"point": (len(leaves), points), "parameter": (len(leaves), len(parameters))}

@@ -61,32 +61,14 @@ def fit_subintervals(
     method: Method = KRIGING,
     snap: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> Piecewise:
-    """Fit models on subintervals until each is accepted or a limit is reached.
+    """Fit models on subintervals of the domain `bounds` (d, 2) until each is accepted or a limit is reached.
 
     Boxes of one generation are evaluated in a single call, so that many ranks can share it.
 
-    Parameters
-    ----------
-    evaluate : callable
-        The true function, ``(n, d)`` points to ``(n,)`` values, NaN where it failed.
-    bounds : (d, 2) array
-        The domain.
-    rng : numpy Generator
-        Every box draws from a stream of its own, spawned from this one.
-    names : sequence of str, optional
-        Names of the inputs.
-    sample : callable
-        ``sample(n, bounds, rng)`` draws points in a box.
-    method : Method
-        What is fitted.
-    snap : callable
-        Points (n, d) to the nearest that exist.
-
-    Returns
-    -------
-    Piecewise
-
-    Raises InputError as the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
+    `evaluate`: the true function, points (n, d) to values (n,), NaN where it failed; `sample`: ``sample(n, bounds, rng)``
+    draws points in a box, every box from a stream of its own, spawned from `rng`; `method`: what is fitted; `snap`: points
+    (n, d) to the nearest that exist. Raises InputError as the method's fit and `accuracy`: crossed bounds, or a box whose
+    samples (nearly) all failed.
     """
     pending = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng)
     done: list[tuple[Leaf, Accuracy, bool]] = []

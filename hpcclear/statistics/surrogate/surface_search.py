@@ -37,12 +37,8 @@ class SurfaceSearch:
     points, up to `max_points`. The test points are drawn once and never trained on: fresh ones in
     each round would let a poor surface pass by luck.
 
-    Attributes
-    ----------
-    best : (ResponseSurface, Accuracy) or None
-        The accepted surface, or the one with the least RMSE on the test points if none was, and its accuracy on these.
-    accepted : bool
-        Whether it met the targets.
+    `best`: the accepted surface, or the one with the least RMSE on the test points if none was, and its accuracy on these;
+    `accepted`: whether it met the targets.
     """
 
     def __init__(
@@ -118,13 +114,7 @@ def fit_until_accepted(
 ) -> None:
     """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
 
-    Parameters
-    ----------
-    evaluate : callable
-        From points by number of the search to values.
-    searches : sequence of SurfaceSearch
-        They know the surfaces afterwards.
-
+    `evaluate`: from points by number of the search to values. The searches know the surfaces afterwards.
     Raises InputError if no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
     while going := {number: one for number, one in enumerate(searches) if not one.over}:

@@ -32,25 +32,11 @@ DEPENDENT = 1e-8
 
 
 def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
-    """Exponents of the terms that values speak for, and how far off such a surface is.
+    """Exponents (t, d) of the terms that finite values (n,) speak for, at points (n, d) scaled to [-1, 1], and how far off
+    they are.
 
-    Parameters
-    ----------
-    z : array, shape (n, d)
-        Points, scaled to [-1, 1].
-    values : array, shape (n,)
-        Finite.
-    order : int
-        Total order at most.
-
-    Returns
-    -------
-    array of int, shape (t, d)
-        The constant first, all linear terms, then others as they were found.
-    float
-        Mean square error at points that had no part in the choice.
-
-    Raises InputError: too few points to choose by.
+    The constant comes first, then all linear terms, then others up to the total order as they were found; the error is the
+    mean square at points that had no part in the choice. Raises InputError: too few points to choose by.
     """
     from threadpoolctl import threadpool_limits
 

@@ -22,10 +22,7 @@ def _columns(first: int, size: int = at.MAX_JOINTS) -> slice:
 class Turns:
     """Integrals of the measures at the ends of revolutions, from steps as they come, and when forces are largest.
 
-    Attributes
-    ----------
-    transient : int
-        Revolutions before those in which the largest forces count.
+    The largest forces count after so many `transient` revolutions.
     """
 
     transient: int = 0

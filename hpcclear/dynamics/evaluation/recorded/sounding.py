@@ -103,14 +103,8 @@ class SoundingEvaluator:
 
 
 class Heard:
-    """One sample of a recording, as its steps come.
-
-    Parameters
-    ----------
-    instants : int
-        Of a revolution that its pieces have.
-    count : int
-        Of a revolution that spectra are made of; 0 for none.
+    """One sample of a recording, as its steps come: pieces of so many `instants` of a revolution, spectra of `count` (0:
+    none).
     """
 
     def __init__(self, scene: Scene, sample: Recorded, instants: int, count: int) -> None:

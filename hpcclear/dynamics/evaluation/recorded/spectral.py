@@ -18,12 +18,7 @@ LEAST = 720
 class Spectra:
     """Mean squares of the orders of contact forces, and of the force on the frame, in the averaged revolutions.
 
-    Parameters
-    ----------
-    scene : Scene
-    sample : Recorded
-    count : int
-        Instants a revolution by which the highest order is chosen (`hpcclear.statistics.spectra.highest`).
+    `count`: instants a revolution by which the highest order is chosen (`hpcclear.statistics.spectra.highest`).
     """
 
     def __init__(self, scene: Scene, sample: Recorded, count: int) -> None:

@@ -72,13 +72,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Recorded:
-    """One of the samples of a recording.
-
-    Attributes
-    ----------
-    par : ndarray, shape (PARAMETERS,)
-        Kernel parameters.
-    """
+    """One of the samples of a recording; `par` (PARAMETERS,): of the kernel."""
 
     problem: Problem
     par: Array
@@ -109,20 +103,11 @@ class Recorded:
 
 
 class Recording:
-    """Samples in the lanes of an ensemble, their accepted steps kept.
+    """Samples in the lanes of an ensemble, their accepted steps kept: of the scene, or of the points `design` of it.
 
-    Parameters
-    ----------
-    scene : Scene
-    copies : sequence of int
-        Perturb the starts of the scene and of those beside it in the directions of these numbers
-        (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not, and is the default.
-    perturbations, objective
-        Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
-    beside : sequence of Scene
-        Others with the same problem, which are recorded as well; without replicas, and all of them can turn.
-    design : Points
-        Points of the first, recorded together; by default the scene itself. Replicas go with one alone.
+    `copies`: perturb the starts of the scene and of those `beside` it, which have the same problem, in the directions of these
+    numbers (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not. Those beside it are without replicas, and all can turn.
+    `perturbations`, `objective`: as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`; replicas go with one point alone.
     """
 
     def __init__(
@@ -207,13 +192,9 @@ class Piece:
 
 
 class StepInstants:
-    """Instants over the steps of one sample as these come.
+    """Instants over the steps of one sample as these come: `count` a revolution, or, for 0, every step.
 
-    Parameters
-    ----------
-    count : int
-        Instants a revolution, evenly spaced in time from its start to its end; the last revolution ends with the last step. 0:
-        every step is an instant.
+    They are evenly spaced in time from its start to its end; the last revolution ends with the last step.
     """
 
     def __init__(self, count: int) -> None:

@@ -33,13 +33,7 @@ def direction(number: int, length: int) -> Array:
 def perturbed(start: Start, scale: Array, numbers: range, size: float = PERTURBATION) -> Start:
     """Copies of one start, perturbed in the directions of their numbers; number 0 stays as it is.
 
-    Parameters
-    ----------
-    start : Start, one row
-    scale : ndarray, shape (2 n,)
-        Of `scales`.
-    size : float
-        Root mean square of a perturbation over scale.
+    `size`: root mean square of a perturbation over `scale` (2 n,), that of `scales`.
     """
     n = len(scale) // 2
     copies = Start(np.repeat(start.rows, len(numbers), axis=0))

@@ -89,15 +89,8 @@ def check_steady(scene: Scene) -> None:
 class SteadyEvaluator:
     """Finds the steady mean of points of one scene as a stream; to be used like `evaluation.evaluator.Evaluator`.
 
-    Parameters
-    ----------
-    columns : Points
-        Points (perhaps none) whose names and paths all submitted values share.
-    procedure : function of a Sample, optional
-        What is done to each design; by default `steady_mean` to the scene's ``numerics.target_error`` with
-        ``numerics.target_revolutions``.
-
-    Raises InputError if the scene requires what the kernel cannot do.
+    `procedure`: what is done to each design; by default `steady_mean` to the scene's ``numerics.target_error`` with
+    ``numerics.target_revolutions``. Raises InputError if the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -217,15 +210,8 @@ def summed_up(
 ) -> Records:  # fmt: skip
     """What was found as a record (1,): means over segments and copies, of the peaks too unless the motion is regular.
 
-    Parameters
-    ----------
-    par : ndarray, shape (1, PARAMETERS)
-    kind : dtype
-        Type of the record (`hpcclear.scene.scene.record_of`).
-    responses : sequence of str
-        Further responses, as of `responses_reported`.
-    judged : Objective
-        By what.
+    `par` (1, PARAMETERS); `kind`: type of the record (`hpcclear.scene.scene.record_of`); `responses`: as of
+    `responses_reported`.
     """
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:

@@ -118,16 +118,12 @@ def with_limit(values: Array) -> tuple[float, float, float]:
 
 
 def variance_of_mean(groups: list[Array]) -> tuple[float, float]:
-    """Variance of the mean over time of one copy, and its degrees of freedom.
+    """Variance of the mean over time of one copy, and its degrees of freedom, from groups of copies that share a mean.
 
     Copies are independent of each other: how their means differ needs no model of how segments depend on one another. Parts of
     them say the same with more degrees of freedom where only neighbours depend on each other: variance of a part and twice
     the covariance of two. Both count by their degrees of freedom; where copies differ by more than parts explain, they alone.
-
-    Parameters
-    ----------
-    groups : list of ndarray, shape (segments, copies)
-        Of copies that share a mean; all of as many segments.
+    Groups are (segments, copies), all of as many segments.
     """
     off = np.concatenate([group - group.mean() for group in groups], axis=1)
     n, copies = off.shape

@@ -42,22 +42,12 @@ REPEATS = 1e-5
 
 
 def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Mean]:
-    """Judge the motion of one cell.
+    """Judge the motion of one cell; `sure` as `SURE`. The growth of its `Mean` is the exponent.
 
     The other starts end with the first look at the exponent: by then they show where they end.
 
     Largest Lyapunov exponent per revolution: the mean logarithm by which the distance of a shadow grows over a revolution,
     after which it is set back along the same direction (Benettin et al. 1980, doi:10.1007/BF02128236).
-
-    Parameters
-    ----------
-    sure : float
-        As `SURE`.
-
-    Returns
-    -------
-    Mean
-        Its growth is the exponent.
     """
     effort = Effort(sample, budget=0)
     start = _starts(sample)

@@ -15,15 +15,8 @@ off by 1 %, more than their difference from 1e-5."""
 def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Segment, Outcome, Mean]:
     """Find the steady mean of a design to a relative error (95 % CI), or report that it is missed or does not exist.
 
-    Parameters
-    ----------
-    budget : int
-        Revolutions of all copies together, at most (a segment that is under way is finished).
-
-    Returns
-    -------
-    Mean
-        Of a failed simulation with its status.
+    `budget`: revolutions of all copies together, at most (a segment that is under way is finished). The mean of a failed
+    simulation has its status.
     """
     effort = Effort(sample, budget)
     found, growth = yield from look(effort, target)

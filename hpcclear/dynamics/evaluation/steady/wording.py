@@ -55,13 +55,7 @@ def in_a_line(record: Any, seconds: float | None = None) -> str:
 
 
 def reached(records: Records) -> tuple[str, list[str]]:
-    """How many samples met the target, and a line for each kind of motion in which some did not.
-
-    Parameters
-    ----------
-    records : structured ndarray of `hpcclear.base.outcome.record_type`, shape (n,)
-        Of a scene with a target error.
-    """
+    """How many samples (n,) of a scene met its target error, and a line for each kind of motion in which some did not."""
     short, good = missed(records), records["status"] == Status.OK
     lines = []
     for regime in Regime:

@@ -27,20 +27,10 @@ PACKED = LAST + STAGES
 
 @dataclass(frozen=True)
 class Tableau:
-    """An embedded pair.
+    """An embedded pair, first-same-as-last: stage matrix `a` (stages, stages), weights `b` and error weights `e` (stages,).
 
-    Attributes
-    ----------
-    name : str
-    order : int
-        Order of the solution that is carried on.
-    error_order : int
-        Order of the other one; the error estimate scales like h**(error_order + 1).
-    a, b, e : numpy.ndarray
-        Stage matrix (stages, stages), weights and error weights (stages,), first-same-as-last.
-    source : str
-
-    Raises ValueError if there are more than `STAGES` stages, or coefficients do not fit together.
+    `order`: of the solution that is carried on; `error_order`: of the other one, the error estimate scales like
+    h**(error_order + 1). Raises ValueError if there are more than `STAGES` stages, or coefficients do not fit together.
     """
 
     name: str
