@@ -75,25 +75,15 @@ def latched_factor(rate, inverse_impact_speed, damping):
     return 1.0 + damping * rate * inverse_impact_speed
 
 
-def _nothing_at_rest(name):
-    def check(values):
-        if values["restitution"] == 0:
-            reason = f"the damping of {name!r} divides by the restitution, so 0 has no meaning"
-            return reason, 'Use a value above 0, or the law "lankarani-nikravesh"', "restitution"
-        return None
-
-    return check
+def _above_zero(values):
+    if values["restitution"] == 0:
+        reason = "the damping of this law divides by the restitution, so 0 has no meaning"
+        return reason, 'Use a value above 0, or the law "lankarani-nikravesh"', "restitution"
+    return None
 
 
 def by_restitution(
-    name: str,
-    factor: Function,
-    *,
-    words: str,
-    source: str,
-    formula: str,
-    valid: str,
-    divides: bool = False,
+    factor: Function, *, words: str, source: str, formula: str, valid: str, divides: bool = False
 ) -> ContactLaw:
     """The law with a damping coefficient a(c_e), a pure number; `divides`: by c_e, for which 0 then has no meaning."""
     return ContactLaw(
@@ -109,7 +99,7 @@ def by_restitution(
         once=lambda restitution: {"damping": factor(restitution)},
         numbers={"damping": ""},
         factor=latched_factor,
-        check=_nothing_at_rest(name) if divides else None,
+        check=_above_zero if divides else None,
         lossless=lambda values: values["restitution"] >= 1,
         **HERTZIAN,
     )

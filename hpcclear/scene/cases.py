@@ -61,9 +61,7 @@ class Goal(Table):
             with at("formula", self.formula[:80]):
                 names_in(self.formula)
         if self.statistic == "exceedance" and self.limit is None:
-            raise invalid(
-                "the threshold is missing", "Add limit, the threshold of f", "limit", None
-            )
+            raise invalid("the threshold is missing", "Add limit, the threshold of f", "limit")
         if self.of is not None and (self.statistic is None or self.statistic == "cost"):
             raise invalid("belongs to a statistic of a response", "Remove it", "of")
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):

@@ -155,11 +155,11 @@ class Cost(Table):
             raise invalid(
                 "the law of the cost is missing",
                 'Write law = "reciprocal" or "exponential", or a list with the cost of each option',
-                "law", None,
-            )  # fmt: skip
+                "law",
+            )
         for key in needed[self.law]:
             if getattr(self, key) is None:
-                raise invalid(f"the law {self.law!r} needs it", "Add it", key, None)
+                raise invalid(f"the law {self.law!r} needs it", "Add it", key)
         if self.law == "reciprocal" and self.scale is not None:
             raise invalid('belongs to "exponential"', "Remove it", "scale")
 

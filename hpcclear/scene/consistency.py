@@ -79,7 +79,7 @@ class ConsistentTables(SceneTables):
     def _check_mechanism(self) -> None:
         for table in ("drive", "joints"):
             if self.template is not None and getattr(self, table) is None:
-                raise invalid("is missing", "Add it", key=table, value=None)
+                raise invalid("is missing", "Add it", table)
         for entry in ("slider_load", "guide_friction"):
             value = getattr(self.effects, entry)
             if self.template is None and value is not None:
@@ -102,8 +102,8 @@ class ConsistentTables(SceneTables):
             raise invalid(
                 "a slider in a guide with clearance can turn, so it needs an inertia",
                 "Write its moment of inertia about its pin in kg m2",
-                key="mechanism.slider.inertia", value=None,
-            )  # fmt: skip
+                "mechanism.slider.inertia",
+            )
         (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
         with self._named_as_written("joints.guide"):
             guide.check()
@@ -128,18 +128,18 @@ class ConsistentTables(SceneTables):
                     entry, part = ("length", "bearing") if is_pin else ("width", "slider")
                     raise invalid(
                         f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
-                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
-                    )  # fmt: skip
+                        f'Add {entry} = "20 mm" or so to the joint',
+                        f"{self.joint_key(name)}.{entry}",
+                    )
         if clearance and contact is None:
             law = 'contact = { law = "lankarani-nikravesh", restitution = 0.9 }'
             remedy = f'Add {law}, or make the joints ideal (kind = "ideal")'
-            raise invalid("a clearance joint needs a contact law", remedy, "effects.contact", None)
+            raise invalid("a clearance joint needs a contact law", remedy, "effects.contact")
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
                 "friction acts in joints with clearance, but all joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
-                key="effects.friction.law",
-                value=self.effects.friction.law,
+                "effects.friction.law",
             )
 
     def _check_profiles(self) -> None:
@@ -188,8 +188,8 @@ class ConsistentTables(SceneTables):
             raise invalid(
                 f"{why}, and the objective is {named}",
                 "Remove numerics.target_error, and raise numerics.averaged_revolutions",
-                "numerics.target_error", self.numerics.target_error,
-            )  # fmt: skip
+                "numerics.target_error",
+            )
 
     def _check_pressures(self) -> None:
         for one in () if self.effects.has_pressure else self._objectives():

@@ -233,9 +233,8 @@ class CrankTorque(Table):
         check_one_of("torque", self.torque, self.torque_by_speed, remedy)
         if self.torque_by_speed is not None and self.no_load_speed is not None:
             raise invalid(
-                "torque_by_speed says already how the torque falls", "Remove it",
-                key="no_load_speed", value=self.no_load_speed,
-            )  # fmt: skip
+                "torque_by_speed says already how the torque falls", "Remove it", "no_load_speed"
+            )
 
 
 class PlanarTorque(FreeDriving, CrankTorque):
@@ -262,7 +261,7 @@ class PlanarTorque(FreeDriving, CrankTorque):
 
     def _check(self) -> None:
         if by_interval(self) and self.turns != 1:
-            raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
+            raise invalid("interval replaces the turns", "Remove turns", "turns")
 
 
 class PlanarFree(FreeDriving):

@@ -71,8 +71,7 @@ LONGEST_CURVE = 100_000
 
 
 def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> InputError:
-    """An error for validators: `key` is relative to the table that is validated; `...` means "look
-    it up"."""
+    """An error for validators: `key` is relative to the table that is validated; `...`: what stands there."""
     return InputError(key, value, reason, remedy)
 
 
@@ -130,7 +129,20 @@ class Table(BaseModel):
         """
         for kind in reversed(type(self).__mro__):
             if "_check" in kind.__dict__:
-                kind.__dict__["_check"](self)
+                try:
+                    kind.__dict__["_check"](self)
+                except InputError as error:
+                    error.value = self._held(error.key) if error.value is ... else error.value
+                    raise
+
+    def _held(self, key: str) -> object:
+        """A number or text at a dotted key, which may be a default that no file has; `...` for anything else."""
+        found: Any = self
+        for part in key.split("."):
+            if not (isinstance(found, Table) and part in type(found).model_fields):
+                return ...
+            found = getattr(found, part)
+        return ... if isinstance(found, (Table, tuple)) else found
 
 
 class Converted:

@@ -86,10 +86,7 @@ class FileCurve(Table):
             raise invalid("stands beside bore", "Keep one of them", "area")
         if (given == ["pressure"] or piston) and self.bore is None and self.area is None:
             raise invalid(
-                "is missing: pressures push on a piston",
-                'Add bore = "42 mm", or area',
-                "bore",
-                None,
+                "is missing: pressures push on a piston", 'Add bore = "42 mm", or area', "bore"
             )
 
     @property

@@ -194,15 +194,16 @@ class Tolerance(Table):
 
     def _check(self) -> None:
         if self.distribution == "uniform" and (self.cp, self.cpk, self.towards) != (1, None, None):
-            raise invalid("belongs to a normal distribution", "Remove it", "cp", self.cp)
+            raise invalid("belongs to a normal distribution", "Remove it", "cp")
         if self.cpk is not None and self.cpk > self.cp:
             raise invalid("is larger than cp", "Write cpk no larger than cp", "cpk")
         off = self.cpk is not None and self.cpk < self.cp
         if off and self.towards is None:
             raise invalid(
                 "the mean lies off the middle, and nothing says where",
-                'Add towards = "upper" or "lower"', "towards", None,
-            )  # fmt: skip
+                'Add towards = "upper" or "lower"',
+                "towards",
+            )
 
     def part(self, limits: SizeLimits | None) -> tolerances.PartSize:
         """Its distribution; `limits` are those of the fit."""

@@ -98,8 +98,7 @@ class PinInBearing(Table):
                 f"the clearance must be smaller than the bearing radius ({shown(self.bearing_radius, 'm')}), "
                 "or no journal is left",
                 "Write the radial clearance R_B - R_J",
-                key="clearance",
-                value=self.clearance,
+                "clearance",
             )
         check_film(self.film, self.clearance, self.bearing_radius)
         check_waves(self.out_of_round, self.clearance, self.film)
@@ -160,15 +159,17 @@ class OfContacts(Table):
         given = [name for name in own if getattr(self, name) is not None]
         if self.clearance is None and given:
             raise invalid(
-                "belongs to a joint with clearance", 'Add clearance = "0.1 mm" or so, or remove it',
-                key=given[0], value=None,
-            )  # fmt: skip
+                "belongs to a joint with clearance",
+                'Add clearance = "0.1 mm" or so, or remove it',
+                given[0],
+            )
         for name in own if self.clearance is not None else ():
             if name in (*self.needed, "materials") and name not in given:
                 raise invalid(
                     "is missing, and a joint with clearance needs it",
-                    "Add it, or remove clearance for a joint without", key=name, value=None,
-                )  # fmt: skip
+                    "Add it, or remove clearance for a joint without",
+                    name,
+                )
 
 
 class Guide(OfContacts):
@@ -199,16 +200,17 @@ class Guide(OfContacts):
         if getattr(self, "friction", None) is not None:
             raise invalid(
                 "a slide with clearance rubs at its corners, by the friction of all contacts",
-                "Remove it, and write effects.friction", key="friction", value=None,
-            )  # fmt: skip
+                "Remove it, and write effects.friction",
+                "friction",
+            )
         for entry in ("length", "height"):
             size, radius = getattr(self, entry), self.corner_radius
             if radius is not None and 2.0 * radius >= size:
                 raise invalid(
                     f"both corners of a side must fit into the slider's {entry} ({shown(size, 'm')})",
                     f"Write less than half of the {entry}, such as 1 mm",
-                    key="corner_radius", value=radius,
-                )  # fmt: skip
+                    "corner_radius",
+                )
 
 
 class SliderGuide(Guide):

@@ -233,8 +233,9 @@ class LawTable(Table):
                 raise invalid(
                     f"the law {law.name!r} needs "
                     + (f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"),
-                    f"Add {parameter.name} = {example} or so", parameter.name, None,
-                )  # fmt: skip
+                    f"Add {parameter.name} = {example} or so",
+                    parameter.name,
+                )
             found[parameter.name] = _value(parameter, value)
             if theirs and parameter.count == 1:
                 quantity = quantity_of(parameter)

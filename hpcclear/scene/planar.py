@@ -157,17 +157,14 @@ class PlanarBody(Table):
                 ("mass_center", "is measured along a bar", "center = [x, y]"),
                 ("inertia_ratio", "is over that of a slender bar", "inertia"),
             ):
-                if (value := getattr(self, key)) is not None:
+                if getattr(self, key) is not None:
                     reason = f"{meaning}, and this body has no length"
                     remedy = f"Give its length, or write {instead}"
-                    raise invalid(reason, remedy, key=key, value=value)
+                    raise invalid(reason, remedy, key)
             return
         if self.inertia_ratio is not None and self.inertia:
             raise invalid(
-                "is given beside the inertia itself",
-                "Remove one of the two",
-                key="inertia_ratio",
-                value=self.inertia_ratio,
+                "is given beside the inertia itself", "Remove one of the two", "inertia_ratio"
             )
         if (self.center.x, self.center.y) != (0.0, 0.0):
             raise invalid(

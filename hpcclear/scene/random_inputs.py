@@ -151,7 +151,7 @@ def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> qu
             )
     for key in shapes:
         if key not in parameters:
-            raise invalid(f"the distribution 'scipy:{own}' needs it", "Add it", key, None)
+            raise invalid(f"the distribution 'scipy:{own}' needs it", "Add it", key)
     law = quantiles.Named(own, tuple(parameters.items()), *_ends(entries))
     _check(law, f"scipy:{own}", parameters)
     return law
@@ -289,9 +289,7 @@ class RandomInput(NamedInput):
         for key in (name for name in type(self).model_fields if name not in _COMMON):
             value = getattr(self, key)
             if key in needed and value is None:
-                raise invalid(
-                    f"the distribution {self.distribution!r} needs it", "Add it", key, None
-                )
+                raise invalid(f"the distribution {self.distribution!r} needs it", "Add it", key)
             if key not in needed | further | {"relative"} and value not in (None, False):
                 raise invalid(
                     f"does not belong to this {self.distribution!r} distribution", "Remove it", key

@@ -92,8 +92,7 @@ class SliderCrank(Table):
                 f"the rod must be longer than the crank ({shown(self.crank.length, 'm')}){beside}, "
                 "or the crank cannot rotate",
                 "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
-                key="rod.length",
-                value=self.rod.length,
+                "rod.length",
             )
 
 

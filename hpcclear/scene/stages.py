@@ -143,7 +143,7 @@ class Swarm(Table):
     def _check(self) -> None:
         if (self.algorithm or "").startswith("pymoo:") and self.particles < FEWEST:
             reason = f"{self.algorithm} recombines designs and needs at least {FEWEST} of them"
-            raise invalid(reason, f"Request {FEWEST} or more", "particles", self.particles)
+            raise invalid(reason, f"Request {FEWEST} or more", "particles")
 
 
 class MomentAccuracy(Table):
@@ -236,8 +236,7 @@ class Verification(Table):
             raise invalid(
                 "the number of points of a Sobol sequence follows from the accuracy",
                 'Leave it out and set study.accuracy or most_samples, or write method = "monte-carlo"',
-                key="samples",
-                value=self.samples,
+                "samples",
             )
 
     @property

@@ -167,8 +167,7 @@ class Study(StudyTables):
             raise invalid(
                 f"case {case.name} has {len(case.goals)} objectives, each with a best design of its own",
                 f"Request {len(case.goals)} solutions or more",
-                key="swarm.archive",
-                value=self.swarm.archive,
+                "swarm.archive",
             )
         for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
             for k, goal in enumerate(rows):
@@ -283,8 +282,7 @@ class Study(StudyTables):
                 raise invalid(
                     f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
                     f"Request at least {10 * inputs} samples",
-                    key="samples",
-                    value=self.samples,
+                    "samples",
                 )
 
 
@@ -335,6 +333,5 @@ def _enough(stage: Sensitivity, inputs: int, order: int, samples: int, entry: st
             f"more than the {samples} samples",
             f"Request at least {10 * inputs if chosen else 2 * terms} samples"
             + ("" if chosen else ", or lower the order"),
-            key=f"sensitivity.{entry}",
-            value=samples,
+            f"sensitivity.{entry}",
         )

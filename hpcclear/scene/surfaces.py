@@ -48,15 +48,13 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
         raise invalid(
             f"is for lengths from {least:g} to {most:g} diameters, and this bearing is {ratio:.3g} long",
             'Take "short"' if ratio < 1.0 else 'Take "long"',
-            key="film.model",
-            value=film.model,
+            "film.model",
         )
     if 4.0 * film.roughness > clearance:
         raise invalid(
             f"must be at most a quarter of the clearance ({shown(clearance, 'm')}), or no film is left",
             "Write the roughness of both surfaces together",
-            key="film.roughness",
-            value=film.roughness,
+            "film.roughness",
         )
 
 
@@ -149,8 +147,7 @@ class WornSurface(Table):
             raise invalid(
                 "a dimensionless coefficient needs a hardness; a coefficient in m2/N must have none",
                 "Give both, or neither",
-                key="hardness",
-                value=self.hardness,
+                "hardness",
             )
 
 
@@ -178,10 +175,7 @@ class Wear(Table):
     def _check(self) -> None:
         if self.bearing is None and self.journal is None:
             raise invalid(
-                "neither bearing nor journal wears",
-                "Give one of them a coefficient",
-                "bearing",
-                None,
+                "neither bearing nor journal wears", "Give one of them a coefficient", "bearing"
             )
 
 
@@ -240,5 +234,4 @@ class Lives(Table):
                 "copies is larger than most_copies",
                 "Raise most_copies, or lower copies",
                 "most_copies",
-                self.most_copies,
             )

@@ -7,10 +7,12 @@ readers keep a cell for each place of a range, and every text. What only Excel c
 import datetime
 import io
 import posixpath
+import re
 import zipfile
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 from xml.parsers import expat
@@ -19,7 +21,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.remarks import remark
 from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows, Stored
-from hpcclear.scene.references import letters, place
 
 LARGEST = LARGEST_FILE // 4
 """Bytes of a workbook, which is packed."""
@@ -222,6 +223,27 @@ class _Book:
 def _local(tag: str) -> str:
     """A tag without the prefix of its namespace."""
     return tag.rpartition(":")[2] if ":" in tag else tag
+
+
+@lru_cache(2**14)
+def place(reference: str) -> tuple[int, int]:
+    """Row and column, from 1 on, of a reference such as C5."""
+    found = re.fullmatch(r"\$?([A-Z]{1,3})\$?([0-9]{1,7})", reference)
+    if found is None:
+        raise ValueError(f"{reference[:20]!r} is no cell")
+    column = 0
+    for letter in found[1]:
+        column = 26 * column + ord(letter) - 64
+    return int(found[2]), column
+
+
+def letters(column: int) -> str:
+    """Name of a column by its number: C of 3."""
+    made = ""
+    while column:
+        column, rest = divmod(column - 1, 26)
+        made = chr(65 + rest) + made
+    return made
 
 
 class _Text:

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "flores",
     factor,
     words="Flores and others's, damping by restitution",
     source="Flores et al. 2011, doi:10.1007/s11044-010-9237-4",

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "gonthier",
     factor,
     words="Gonthier and others's, damping by restitution",
     source="Gonthier et al. 2004, doi:10.1023/B:MUBO.0000029392.21648.bc",

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "herbert-mcwhannell",
     factor,
     words="Herbert and McWhannell's, damping by restitution",
     source="Herbert and McWhannell 1977, doi:10.1115/1.3439270",

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "hu-guo",
     factor,
     words="Hu and Guo's, damping by restitution",
     source="Hu and Guo 2015, doi:10.1007/s11012-015-0135-1",

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "lankarani-nikravesh",
     factor,
     words="Lankarani and Nikravesh's, damping by restitution",
     source="Lankarani and Nikravesh 1990, doi:10.1115/1.2912617 (paper eq. 7)",

@@ -9,7 +9,6 @@ def factor(restitution):
 
 
 LAW = by_restitution(
-    "lee-wang",
     factor,
     words="Lee and Wang's, damping by restitution",
     source="Lee and Wang 1983, doi:10.1115/1.3267402",

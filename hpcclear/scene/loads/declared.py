@@ -105,11 +105,11 @@ class SizedLoad(Load):
             raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
         if self.angle_of is not None and not isinstance(size, tuple):
             reason = f"there is no table of {entry} against an angle"
-            raise invalid(reason, "Remove it", key="angle_of", value=self.angle_of)
+            raise invalid(reason, "Remove it", "angle_of")
         if not self.repeats:
             return
         if timed is None:
-            raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
+            raise invalid(f"there is no {entry}_by_time", "Remove it", "repeats")
         if timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]:
             raise invalid(
                 "a table that repeats begins at 0 s, and ends at the value with which it begins",

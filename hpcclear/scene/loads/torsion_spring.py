@@ -33,11 +33,10 @@ class TorsionSpringLoad(Load):
             raise invalid(
                 "stops and their stiffness go together",
                 "Give lower or upper, and stop_stiffness above 0",
-                key="stop_stiffness",
-                value=self.stop_stiffness,
+                "stop_stiffness",
             )
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            raise invalid("is not below the upper stop", "Swap both", key="lower", value=self.lower)
+            raise invalid("is not below the upper stop", "Swap both", "lower")
 
     @property
     def by_angle(self) -> bool:  # type: ignore[override]
