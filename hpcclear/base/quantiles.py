@@ -21,19 +21,8 @@ TAIL = 6.0
 
 
 def truncated_quantile(chance: Array, low: float, high: float) -> Array:
-    """Quantiles of the standard normal truncated at two bounds, by inversion.
-
-    Parameters
-    ----------
-    chance : array of any shape
-        Probabilities, between 0 and 1.
-    low, high : float
-        The bounds, in standard deviations, low < 0 < high.
-
-    Returns
-    -------
-    array of that shape
-        In standard deviations, within the bounds.
+    """Quantiles of the standard normal truncated at two bounds, low < 0 < high, by inversion; of probabilities of any shape.
+    All in standard deviations.
     """
     from scipy.special import ndtr, ndtri  # a quarter of a second that a Latin hypercube saves
 

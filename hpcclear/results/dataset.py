@@ -59,39 +59,17 @@ def dataset(
     *,
     whole: bool = True,
 ) -> Results:
-    """The content of one kind of result file, with every attribute the table knows.
+    """The content of one kind of result file (a key of `KINDS`), with every attribute the table knows.
 
-    Parameters
-    ----------
-    kind : str
-        Key of `hpcclear.results.names.KINDS`.
-    coords : mapping of str to array, shape (size of the dimension,)
-        The coordinates of the kind, all of them.
-    data : mapping of str to array
-        Variables of the kind, and design variables under their names or scene paths; for Kriging
-        models also their bounds, NAME_lower and NAME_upper. Shapes as in the table.
-    attributes : mapping, optional
-        Further global attributes, text or numbers; see `hpcclear.results.provenance.program` and `Scene.origin`.
-    units : mapping of str to str, optional
-        Units of design variables; those of the paper's (`DESIGN_VARIABLES`) are known.
-    objective : Objective
-        Of the study: its unit is that of everything that the table says has it, and its words say what f is, in a
-        global attribute ``objective`` too where it is not the mean gap.
-    words : mapping of str to str, optional
-        Long names of design variables: what they drive, whatever they are called.
-    whole : bool
-        Whether all that is required must be there: what is drawn on the way may lack some, a file may not.
+    `coords`: all coordinates of the kind; `data`: its variables, and design variables under their names or scene paths, for
+    Kriging models also their bounds, NAME_lower and NAME_upper; shapes as in the table. `attributes`: further global ones,
+    text or numbers (`hpcclear.results.provenance.program`, `Scene.origin`). `units`, `words`: of design variables, their
+    units and what they drive; those of the paper's (`DESIGN_VARIABLES`) are known. `objective`: of the study, its unit is
+    that of everything that the table says has it, and its words say what f is, in a global attribute ``objective`` too where
+    it is not the mean gap. What is drawn on the way need not be `whole`: it may lack some that a file has to have.
 
-    Returns
-    -------
-    Results
-
-    Raises
-    ------
-    ValueError
-        A name, shape or type that is not in the table, or a required variable missing.
-    InputError
-        A design variable whose name cannot be one.
+    Raises ValueError: a name, shape or type that is not in the table, or a required variable missing. Raises InputError: a
+    design variable whose name cannot be one.
     """
     table = KINDS[kind]
     least = set(table.coords) - {*table.optional} if whole else set()
@@ -168,10 +146,7 @@ def _design_row(
 def variable_name(name: str, kind: str = "samples") -> str:
     """The name a design variable has in a file: a scene path with its dots as underscores.
 
-    Raises
-    ------
-    InputError
-        The name is no name, or a result is called so.
+    Raises InputError: the name is no name, or a result is called so.
     """
     plain = name.replace(".", "_")
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", plain) is None:
@@ -194,38 +169,12 @@ def samples_dataset(
     joints: Sequence[str] = JOINTS,
     labels: Sequence[str] = (),
 ) -> Results:
-    """Outcome records and the designs they belong to, by growing sample number.
+    """Outcome records (n,), in any order, and the designs they belong to (n, k), SI, as results of kind ``samples``, by
+    growing sample number.
 
-    Parameters
-    ----------
-    names : sequence of str, length k
-        Design variables, by name or scene path.
-    values : array, shape (n, k)
-        Designs, a row for each record, in SI units.
-    units : mapping of str to str
-        Units of the design variables that are not the paper's.
-    records : structured array, shape (n,)
-        Of a `hpcclear.base.outcome.record_type`, in any order, each sample once.
-    attributes : mapping, optional
-        Further global attributes.
-    objective : Objective
-        What ``objective`` is in the records.
-    words : mapping of str to str, optional
-        Long names of the design variables.
-    joints : sequence of str
-        Labels of the joints of the records.
-    labels : sequence of str, length n
-        Names of the designs, where they have some.
-
-    Returns
-    -------
-    Results
-        ResultKind ``samples``.
-
-    Raises
-    ------
-    ValueError
-        Shapes that do not match, a sample twice, a design that is not finite.
+    `names`: design variables, by name or scene path, with the `units` and `words` of those that are not the paper's; `joints`:
+    labels of the joints of the records; `labels`: names of the designs, where they have some; others as of `dataset`.
+    Raises ValueError: shapes that do not match, a sample twice, a design that is not finite.
     """
     values = np.asarray(values, dtype=float)
     if values.shape != (len(records), len(names)):
@@ -297,14 +246,8 @@ def records(samples: Results) -> np.ndarray:
 def write(content: Results, path: str | os.PathLike[str]) -> None:
     """Write results as NetCDF-4, whole or not at all; equal content gives equal bytes.
 
-    The file is written under a temporary name in the same directory, synced, and renamed.
-
-    Raises
-    ------
-    InputError
-        The place cannot be written to.
-    StorageError
-        The disk is full or fails; what stood at `path` before still does.
+    The file is written under a temporary name in the same directory, synced, and renamed. Raises InputError: the place cannot
+    be written to. Raises StorageError: the disk is full or fails; what stood at `path` before still does.
     """
     netcdf.save(content, _path(path))
 
@@ -312,24 +255,9 @@ def write(content: Results, path: str | os.PathLike[str]) -> None:
 def read(
     path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
 ) -> Results:
-    """Read a result file into memory and check it against the table.
+    """Read a result file into memory and check it against the table; of a kind and made from a scene, if these are given.
 
-    Parameters
-    ----------
-    kind : str, optional
-        The kind it must be of; None: any.
-    scene_hash : str, optional
-        The scene it must have been made from; None: any.
-
-    Returns
-    -------
-    Results
-
-    Raises
-    ------
-    InputError
-        The file is missing, cut off, changed, foreign, of another kind or scene, or says what
-        cannot be.
+    Raises InputError: the file is missing, cut off, changed, foreign, of another kind or scene, or says what cannot be.
     """
     place = _path(path)
     content = netcdf.load(place)
@@ -346,10 +274,7 @@ def read(
 def files_in(directory: Path) -> list[Path]:
     """Result files of a directory and of its folder ``responses``, in order; not those of runs under way.
 
-    Raises
-    ------
-    InputError
-        There is no such directory, or no result in it.
+    Raises InputError: there is no such directory, or no result in it.
     """
     if not directory.is_dir():
         reason = "this is a file" if directory.exists() else "there is no such directory"

@@ -38,12 +38,7 @@ def kind_of(mode: int) -> str:
 class Bend:
     """Terms of one bar; vectors are held in its frame. What several places need is written down once.
 
-    Attributes
-    ----------
-    kinds : tuple of str
-        Of its coordinates.
-    q, v : tuple of Term
-        Amplitudes, m, and their velocities.
+    `kinds`: of its coordinates; `q`, `v`: amplitudes, m, and their velocities.
     """
 
     def __init__(self, body: Body, writer: Writer) -> None:
@@ -294,15 +289,9 @@ class Bent(NamedTuple):
 def bent(
     found: Mapping[str, Number], q: Array, v: Array, turning: tuple[Array, Array, Array]
 ) -> Bent:
-    """Of amplitudes and velocities (modes, m).
+    """Of amplitudes and velocities (modes, m), with what `numbers` found.
 
-    Parameters
-    ----------
-    found : dict
-        Of `numbers`.
-    q, v : ndarray, shape (modes, m)
-    turning : tuple
-        Velocities along and across of the straight bar's mass centre, m/s, and the angular velocity, rad/s; (m,).
+    `turning`: velocities along and across of the straight bar's mass centre, m/s, and the angular velocity, rad/s; (m,).
     """
     rows = range(1, len(q) + 1)
     along, across, spin = turning

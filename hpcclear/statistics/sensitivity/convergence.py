@@ -52,19 +52,10 @@ class ConvergenceIntervals:
 def convergence_intervals(
     history: SensitivityHistory, *, confidence: float = 0.99, tolerance: float = 0.02
 ) -> ConvergenceIntervals:
-    """Find where each sensitivity stopped changing (rule: module text; paper: 4.2, step 1).
+    """Find where each sensitivity stopped changing (rule: module text; paper: 4.2, step 1), by two-sided comparisons.
 
-    Parameters
-    ----------
-    confidence : float
-        Two-sided, of each comparison, in (0, 1).
-    tolerance : float
-        Relative change of a derivative that counts as none, at least 0. It matters for an f
-        without scatter, whose standard errors are small; the change is part of the uncertainty.
-
-    Returns
-    -------
-    ConvergenceIntervals
+    `tolerance`: relative change of a derivative that counts as none, at least 0. It matters for an f without scatter, whose
+    standard errors are small; the change is part of the uncertainty.
     """
     _, *shape = history.sensitivity.shape
     interval, plateau = np.full((2, *shape), -1, np.int64)
@@ -90,20 +81,11 @@ def convergence_intervals(
 def best_estimates(
     history: SensitivityHistory, intervals: ConvergenceIntervals
 ) -> tuple[Array, Array]:
-    """One derivative and its uncertainty for each clearance and variable, to rank and select by.
+    """One derivative and its uncertainty for each clearance and variable, (c, d) each, to rank and select by.
 
-    Taken in the convergence interval; where the derivative is not distinguishable from 0, at the
+    Taken in the convergence interval of the same history; where the derivative is not distinguishable from 0, at the
     beginning of its plateau, where the standard error says how large it could be; NaN where it
     never stopped changing.
-
-    Parameters
-    ----------
-    intervals : ConvergenceIntervals
-        From the same history.
-
-    Returns
-    -------
-    sensitivity, uncertainty : numpy.ndarray, shape (c, d)
     """
     start = np.maximum(intervals.plateau, 0)[np.newaxis]
     bounded = ~intervals.found & (intervals.plateau >= 0)

@@ -44,19 +44,9 @@ class SobolIndices:
 
 
 def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Array:
-    """Points to simulate: two samples A and B, then for each input A with that column of B.
+    """Points to simulate, (n_rows (d + 2), d): two samples A and B, then for each input A with that column of B.
 
-    Parameters
-    ----------
-    bounds : array_like, shape (d, 2)
-    n_rows : int
-        Power of two; n_rows * (d + 2) simulations.
-    rng : numpy.random.Generator
-        Scrambles the Sobol sequences, `REPLICATES` of equal length.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n_rows * (d + 2), d)
+    `bounds` (d, 2); `n_rows`: a power of two. The generator scrambles the Sobol sequences, `REPLICATES` of equal length.
     """
     box = np.asarray(bounds, float)
     d = len(box)
@@ -73,23 +63,10 @@ def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Ar
 
 
 def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95) -> SobolIndices:
-    """Indices from the values at the points of `sobol_design`.
+    """Indices from the values (n_rows (n_inputs + 2),) at the points of `sobol_design`, and their intervals.
 
-    Parameters
-    ----------
-    values : array_like, shape (n_rows * (n_inputs + 2),)
-        Those that are not finite are failed simulations; their rows are dropped.
-    confidence : float
-        Of the intervals, in (0, 1).
-
-    Returns
-    -------
-    SobolIndices
-
-    Raises
-    ------
-    InputError
-        If fewer than two rows succeeded.
+    Values that are not finite are failed simulations; their rows are dropped. Raises InputError if fewer than two rows
+    succeeded.
     """
     y = np.asarray(values, float).reshape(n_inputs + 2, -1)
     rows = np.arange(y.shape[1])

@@ -127,22 +127,9 @@ class Kriging:
         return pad(self.to_unit(self.inputs) / self.length_scales, weights)
 
     def predict(self, points: np.ndarray) -> np.ndarray:
-        """Kriging mean.
+        """Kriging mean (n,) at points (n, d), in the units of the training values and of `lower` and `upper`.
 
-        Parameters
-        ----------
-        points : (n, d) array
-            In the units of `lower` and `upper`.
-
-        Returns
-        -------
-        (n,) array
-            In the units of the training values.
-
-        Raises
-        ------
-        InputError
-            A point lies outside the box (or is NaN): the model does not extrapolate.
+        Raises InputError: a point lies outside the box (or is NaN): the model does not extrapolate.
         """
         points = inside(points, self.names, self.lower, self.upper)
         summed = kernel_sum if self.kernel == SQUARED_EXPONENTIAL else matern_sum
@@ -151,17 +138,8 @@ class Kriging:
         )
 
     def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
-        """Kriging variance at ``(n, d)`` points, of the smooth part or of one noisy evaluation.
-
-        Returns
-        -------
-        (n,) array
-            In squared units of the training values.
-
-        Raises
-        ------
-        InputError
-            As in `predict`.
+        """Kriging variance (n,) at points (n, d), in squared units of the training values, of the smooth part or of one noisy
+        evaluation. Raises InputError as in `predict`.
         """
         points = inside(points, self.names, self.lower, self.upper)
         cross = self._covariance(self.to_unit(self.inputs), self.to_unit(points))

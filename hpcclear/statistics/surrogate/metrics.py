@@ -29,20 +29,11 @@ ROUNDING = 32.0 * np.finfo(np.float64).eps
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Accuracy on test points; see the module's table for the formulas.
+    """Accuracy on `n_test` test points that counted; see the module's table for the formulas.
 
-    Attributes
-    ----------
-    r2, r2_explained, rmae, rmae_mean : float
-        Without unit; NaN where the test values do not vary (or, for `rmae_mean`, have mean 0).
-    rmse : float
-        Root mean square error, in the unit of the function.
-    n_test : int
-        Test points that counted.
-    constant : bool
-        The test values are equal up to rounding, so that R2 and RMAE are undefined.
-    scale : float
-        Largest magnitude of the test values, in the unit of the function.
+    `r2`, `r2_explained`, `rmae` and `rmae_mean` have no unit, and are NaN where the test values do not vary (or, for
+    `rmae_mean`, have mean 0); `rmse`: root mean square error, `scale`: largest magnitude of the test values, both in the unit
+    of the function; `constant`: the test values are equal up to rounding, so that R2 and RMAE are undefined.
     """
 
     r2: float
@@ -65,27 +56,11 @@ class Accuracy:
 
 
 def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
-    """Compare predictions with simulated values (eqs. 26 and 27, both readings).
+    """Compare predictions (n,) with simulated values (n,), eqs. 26 and 27, both readings; values that are not finite are
+    dropped.
 
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        Simulated values; those that are not finite are failed simulations, which are dropped.
-    predictions : array_like, shape (n,)
-        Predictions at the same points, in the same unit.
-
-    Returns
-    -------
-    Accuracy
-
-    Raises
-    ------
-    InputError
-        If fewer than two simulated values are finite.
-
-    Notes
-    -----
-    The standard deviation divides by n, so that ``1 - r2 == (rmse / standard deviation)**2``.
+    The standard deviation divides by n, so that ``1 - r2 == (rmse / standard deviation)**2``. Raises InputError if fewer than
+    two simulated values are finite.
     """
     true, predicted = np.asarray(values, float), np.asarray(predictions, float)
     finite = np.isfinite(true)
@@ -118,20 +93,11 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
 
 
 def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> Array:
-    """Errors at each point of the linear least-squares fit made without it.
+    """Errors (n,) at each point of the linear least-squares fit made without it; NaN where the leverage is 1: there is no
+    such fit.
 
     No refit is needed: the error is ``residual / (1 - leverage)``, the leverage being the diagonal
     of the hat matrix (Allen 1974, DOI 10.1080/00401706.1974.10489157).
-
-    Parameters
-    ----------
-    residuals, leverages : array_like, shape (n,)
-        Residuals of the full fit in the unit of the function, and leverages in [0, 1].
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        NaN where the leverage is 1: the fit without that point does not exist.
     """
     remaining = 1.0 - np.asarray(leverages, float)
     return np.asarray(residuals, float) / np.where(remaining > ROUNDING, remaining, np.nan)

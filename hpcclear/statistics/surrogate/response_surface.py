@@ -70,33 +70,17 @@ class ResponseSurface:
     def predict(self, points: ArrayLike) -> Array:
         """Values at points of shape (n, d), in the unit of f, shape (n,).
 
-        Raises
-        ------
-        InputError
-            If a point is not finite or lies outside the bounds: a surface never extrapolates.
+        Raises InputError if a point is not finite or lies outside the bounds: a surface never extrapolates.
         """
         z = scale_inputs(points, self.bounds)
         return np.asarray(monomials(z, self.exponents) @ self.coefficients)
 
     def gradient(self, point: ArrayLike) -> tuple[Array, Array]:
-        """First derivatives at one point and their standard errors (eq. 14).
+        """First derivatives (d,) at one point inside the bounds and their standard errors (eq. 14), in units of f per unit of
+        each input.
 
-        Parameters
-        ----------
-        point : array_like, shape (d,)
-            Physical units, inside the bounds.
-
-        Returns
-        -------
-        derivatives, standard_errors : numpy.ndarray, shape (d,)
-            In units of f per unit of each input. The errors come from the residual variance: they
-            hold for the polynomial's own scatter, not for terms it lacks; NaN without any degrees
-            of freedom.
-
-        Raises
-        ------
-        InputError
-            As in `predict`.
+        The errors come from the residual variance: they hold for the polynomial's own scatter, not for terms it lacks; NaN
+        without any degrees of freedom. Raises InputError as in `predict`.
         """
         z = scale_inputs(np.asarray(point, float)[np.newaxis], self.bounds)
         rows = np.vstack([slopes(z, self.exponents, j) for j in range(len(self.bounds))])
@@ -108,10 +92,7 @@ class ResponseSurface:
 def scale_inputs(points: ArrayLike, bounds: Array) -> Array:
     """Points of shape (n, d) in physical units, scaled to [-1, 1] over the bounds.
 
-    Raises
-    ------
-    InputError
-        If a coordinate is not finite, or a point lies outside.
+    Raises InputError if a coordinate is not finite, or a point lies outside.
     """
     x = np.asarray(points, float)
     z = (2.0 * x - bounds[:, 0] - bounds[:, 1]) / (bounds[:, 1] - bounds[:, 0])
@@ -142,37 +123,17 @@ def fit_response_surface(
     *,
     chosen: bool = False,
 ) -> ResponseSurface:
-    """Least-squares polynomial of total order `order` through points and values.
+    """Least-squares polynomial of a total order through points (n, d) and values (n,); those that are not finite are dropped.
 
-    Parameters
-    ----------
-    points : array_like, shape (n, d)
-        Physical units, inside the bounds.
-    values : array_like, shape (n,)
-        Values of f; those that are not finite are failed simulations, which are dropped.
-    bounds : array_like, shape (d, 2)
-        Bounds of the inputs; they fix the scaling.
-    order : int
-        Total order, at least 0.
-    chosen : bool
-        Not with all terms up to that order, but with those that the values speak for
-        (`hpcclear.statistics.surrogate.term_choice`): fewer points than terms will do then.
+    The points lie inside `bounds` (d, 2), which fix the scaling. `chosen`: not with all terms up to that order, but with those
+    that the values speak for (`hpcclear.statistics.surrogate.term_choice`): fewer points than terms will do then.
 
-    Returns
-    -------
-    ResponseSurface
-
-    Raises
-    ------
-    InputError
-        If fewer values than terms are finite, if the points do not determine every term (too few
-        distinct values of an input, say), or if shapes, bounds or points cannot be used.
-
-    Notes
-    -----
     Solved through the singular value decomposition, not the normal equations of section 4.2,
     which square the condition number. Values are taken relative to one of them, so that a
     constant gives coefficients of exactly 0.
+
+    Raises InputError if fewer values than terms are finite, if the points do not determine every term (too few distinct
+    values of an input, say), or if shapes, bounds or points cannot be used.
     """
     limits = np.asarray(bounds, float)
     z, y = scale_inputs(points, limits), np.asarray(values, float)
