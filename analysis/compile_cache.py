@@ -100,9 +100,10 @@ class Place:
         out = self.folder / f"{self._number}.nc"
         launcher = [str(BIN / "mpiexec"), "-n", str(ranks)] if ranks else []
         words = [*launcher, *(program or [str(BIN / "hpcclear")]), *COMMANDS[command], str(out)]
+        known = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
         mine = {"HPCCLEAR_CACHE": str(self.cache), "PYTHONPATH": str(self.folder), "COMPILED": str(self.log)}  # fmt: skip
         process = subprocess.Popen(
-            words, env={**os.environ, **mine, **settings}, cwd=self.folder, text=True, start_new_session=True,
+            words, env={**known, **mine, **settings}, cwd=self.folder, text=True, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
         )  # fmt: skip
         return process, out
@@ -215,16 +216,18 @@ def versions(place: Place) -> Iterator[Count]:
         start = f"import sys; sys.path.insert(0, {str(copy)!r}); from hpcclear.__main__ import main; main()"
         programs.append([sys.executable, "-P", "-c", start])
         alone.append(Place(place.folder / f"alone {name}").run("simulate", program=programs[-1]))
-    good = 0
-    for _ in range(2):
-        began = [place.start("simulate", program=one) for one in programs * 2]
-        found = [finished(*one) for one in began]
-        good += sum(
-            one.code == 0 and one.written == own.written
-            for one, own in zip(found, alone * 2, strict=True)
-        )
-    # each version compiles each source once: two of one name
-    yield Count("two versions, one HPCCLEAR_CACHE", 8, good, 0, place.most(), place.left())
+    for settings in ({}, {"NUMBA_CACHE_DIR": str(place.folder / "named")}):
+        good = 0
+        for _ in range(2):
+            began = [place.start("simulate", program=one, **settings) for one in programs * 2]
+            found = [finished(*one) for one in began]
+            good += sum(
+                one.code == 0 and one.written == own.written
+                for one, own in zip(found, alone * 2, strict=True)
+            )
+        name = "NUMBA_CACHE_DIR" if settings else "HPCCLEAR_CACHE"
+        # each version compiles each source once: two of one name
+        yield Count(f"two versions, one {name}", 8, good, 0, place.most(), place.left())
 
 
 def keep(rows: list[Count]) -> None:

@@ -79,6 +79,7 @@ def run(
     command = [sys.executable, "-P", "-m", "hpcclear"]
     command += ["--help"] if overrides is None else ["simulate", str(job), *words, "-o", str(out)]
     environment = {**os.environ, "PYTHONPATH": str(root), "HPCCLEAR_CACHE": cache}
+    environment.pop("NUMBA_CACHE_DIR", None)
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

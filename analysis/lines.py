@@ -62,7 +62,7 @@ FEATURES = {
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
     "compiling, its cache and widths":
-        "base/lowering/* base/generated.py base/code_folder.py base/width.py base/bits.py "
+        "base/lowering/* base/generated.py base/cached.py base/code_folder.py base/width.py base/bits.py "
         "base/jit.py base/unrolled.py base/numbered.py ensemble/compiling.py base/hashing.py",
     "error against run time, plans of jobs":
         "accuracy/* cli/accuracy.py cli/plan.py cli/commands/accuracy.py "

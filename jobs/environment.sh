@@ -20,5 +20,5 @@ bash "$hpcclear_root/jobs/locks/install.sh" "$hpcclear_versions" "$1" "$hpcclear
 PATH=$hpcclear_venv/bin:$PATH
 export PATH
 # One thread a rank: the ranks fill the cores.
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 unset hpcclear_root hpcclear_versions hpcclear_venv hpcclear_word

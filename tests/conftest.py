@@ -1,4 +1,4 @@
-"""One thread for BLAS before numpy loads, and other seeds for the statistical tests."""
+"""One thread for BLAS and Numba before numpy loads, and other seeds for the statistical tests."""
 
 import gc
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from mpi_programs import last_bits
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # tests share the cores with other processes
 
 

@@ -56,7 +56,7 @@ root_of() {
     cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
 }
 
-# Features of the host, less those that a setting takes away, as HPCCLEAR_CPU_FEATURES: features PATTERN
+# Features of the host, less those that a setting takes away, as NUMBA_CPU_FEATURES: features PATTERN
 features() {
     "${PYTHON:-python3}" - "$1" <<'PYTHON'
 import re, sys
@@ -83,16 +83,16 @@ run_setting() {
         debian12) release=bookworm ;;
         python314) release=forky ;;
         lowest) release=bookworm option=--lowest ;;
-        bits256) settings=("HPCCLEAR_CPU_FEATURES=$(features 'avx512')") ;;
+        bits256) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'avx512')") ;;
         bits512)
             grep -qw avx512f /proc/cpuinfo || {
                 echo "| $setting | - | - | not on this processor | not on this processor | - |" >"$results/$setting.row"
                 echo "$setting: not on this processor (it has no AVX-512)"
                 return
             }
-            settings=("HPCCLEAR_CPU_FEATURES=$(features 'none'),-prefer-256-bit")
+            settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'none'),-prefer-256-bit")
             ;;
-        no-fma) settings=("HPCCLEAR_CPU_FEATURES=$(features 'fma|avx512')") ;;
+        no-fma) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'fma|avx512')") ;;
         load8) load=8 ;;
         user) user=somebody above=/home/somebody home=/home/somebody ;;
         umlaut) inner="/eigene Prüfung" ;;

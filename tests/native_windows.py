@@ -21,7 +21,7 @@ FUNCTIONS = (
     "O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY",
 )  # fmt: skip
 LIBRARIES = (
-    "h5py", "matplotlib.pyplot", "llvmlite", "moocore", "pint", "pydantic", "rich.console", "scipy.stats", "sklearn", "xarray",
+    "h5py", "matplotlib.pyplot", "moocore", "numba", "pint", "pydantic", "rich.console", "scipy.stats", "sklearn", "xarray",
 )  # fmt: skip
 """Loaded before: they choose their own code for Windows by the name of the system, which is not changed here."""
 SIGNALS = (

@@ -4,24 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from numba import njit
 
-from hpcclear.base.jit import scalar_function
-from hpcclear.base.lowering.compiled import at_first_call
 from hpcclear.dynamics.physics.angles import sincos
 
 
-@scalar_function
-def fill(angles, found):
-    for k in range(len(angles)):
-        found[0, k], found[1, k] = sincos(angles[k])
-
-
-compiled = at_first_call(fill)
-
-
+@njit
 def of_all(angles):
     found = np.empty((2, len(angles)))
-    compiled(angles, found)
+    for k in range(len(angles)):
+        found[0, k], found[1, k] = sincos(angles[k])
     return found
 
 

@@ -13,7 +13,7 @@ SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
 
 
 def test_import_alone_loads_nothing_heavy():
-    heavy = {"llvmlite", "mpi4py", "sklearn", "matplotlib", "scipy", "xarray"}
+    heavy = {"numba", "mpi4py", "sklearn", "matplotlib", "scipy", "xarray"}
     assert not loaded_by("import hpcclear", heavy)
     assert loaded_by("import scipy", heavy) == {"scipy"}
 

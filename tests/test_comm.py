@@ -289,9 +289,10 @@ def test_launchers_are_recognised(environment, size, rank):
 def test_every_library_is_kept_to_one_thread():
     script = (
         "import numpy; from hpcclear.ranks.launcher import pin_threads; pin_threads()\n"
-        "import scipy.linalg, threadpoolctl\n"
-        "print({i['num_threads'] for i in threadpoolctl.threadpool_info()})"
+        "import scipy.linalg, numba, threadpoolctl\n"
+        "print({i['num_threads'] for i in threadpoolctl.threadpool_info()},"
+        " numba.get_num_threads())"
     )
     root = PROGRAMS.parent.parent
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
-    assert run.stdout.split() == ["{1}"], run.stderr
+    assert run.stdout.split() == ["{1}", "1"], run.stderr

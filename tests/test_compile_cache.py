@@ -1,6 +1,5 @@
 """The compile cache: a damaged file is compiled again, one process compiles while others wait, and no wait is for ever."""
 
-import ctypes
 import errno
 import importlib
 import inspect
@@ -14,9 +13,7 @@ import pytest
 from compile_cache import KINDS, damaged
 from patience import crowded
 
-from hpcclear.base import host, kept
-from hpcclear.base.lowering import compiled as lowering
-from hpcclear.base.lowering.values import DOUBLE, Kind
+from hpcclear.base import cached, host, kept
 
 
 @pytest.fixture
@@ -26,14 +23,10 @@ def said(monkeypatch, capsys):
     return lambda: [line for line in capsys.readouterr().err.splitlines() if "damaged" in line]
 
 
-def compiled_of(function):
-    return lowering.Compiled(function, [Kind(DOUBLE)], (), ctypes.c_double)
-
-
 @pytest.fixture
 def compiled(tmp_path, monkeypatch):
     """Two functions, each loaded or compiled anew: their values, and how many were loaded."""
-    monkeypatch.setattr(lowering, "chosen_folder", lambda: str(tmp_path / "cache"))
+    monkeypatch.setattr(cached, "chosen_folder", lambda: str(tmp_path / "cache"))
     (tmp_path / "cache").mkdir()
     (tmp_path / "module.py").write_text(
         "def twice(x):\n    return 2.0 * x\n\n\ndef thrice(x):\n    return 3.0 * x\n"
@@ -41,13 +34,10 @@ def compiled(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     module = importlib.import_module("module")
 
-    made, usual = [], lowering.optimised_module
-    monkeypatch.setattr(lowering, "optimised_module", lambda *of: (made.append(of), usual(*of))[1])
-
     def load():
-        made.clear()
-        values = [compiled_of(one)(1.0) for one in (module.twice, module.thrice)]
-        return values, 2 - len(made)
+        functions = [cached.cached(one) for one in (module.twice, module.thrice)]
+        values = [function(1.0) for function in functions]
+        return values, sum(sum(one.stats.cache_hits.values()) for one in functions)
 
     yield load
     sys.modules.pop("module")
@@ -128,15 +118,15 @@ def test_where_nothing_can_be_locked_or_kept_everyone_compiles(tmp_path, compile
     assert compiled() == ([2.0, 3.0], 2 if fault == "no locks" else 0)
 
 
-def wrong(x):
-    return x.nothing
-
-
 def test_an_error_while_compiling_gives_the_lock_back(tmp_path, monkeypatch):
-    monkeypatch.setattr(lowering, "chosen_folder", lambda: str(tmp_path))
+    monkeypatch.setattr(cached, "chosen_folder", lambda: str(tmp_path))
+
+    def wrong(x):
+        return x.nothing
+
     for _ in range(2):
         with pytest.raises(Exception, match="nothing"):
-            compiled_of(wrong)
+            cached.cached(wrong)(1.0)
         assert not list(tmp_path.rglob("*.lock"))
 
 

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from commands import warm_command
 from patience import crowded
 
-from hpcclear.base import private, remarks
+from hpcclear.base import code_folder, private, remarks
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.private import private_folder
 from hpcclear.cli import cli
@@ -207,6 +207,28 @@ def test_a_folder_that_others_can_exchange_is_not_used(
     else:
         assert folders == {parent / f"hpcclear-{private.user_name()}"}
         assert said == []
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o757, 0o750, 0o701, 0o1777])
+def test_a_folder_of_numba_that_others_can_open_is_not_used(
+    tmp_path, monkeypatch, said, home, mode
+):
+    """Code in it is loaded as it is, whoever named the folder; a link of one's own may lead to it."""
+    folder = tmp_path / "named"
+    folder.mkdir()
+    (tmp_path / "link").symlink_to(folder)
+    for k, name in enumerate(("named", "link")):
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / name))
+        folder.chmod(mode)
+        assert code_folder._place.__wrapped__() == (private_folder("HPCCLEAR_CACHE"), False)
+        assert str(tmp_path / name) in said[k]
+        assert "open to others" in said[k]
+        folder.chmod(0o700)
+        assert code_folder._place.__wrapped__() == (folder, True)
+    assert len(said) == 2
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "new"))
+    assert code_folder._place.__wrapped__() == (tmp_path / "new", True)
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
 
 
 @pytest.mark.parametrize("made", ["a file", "a link", "open to others", "somebody else's"])

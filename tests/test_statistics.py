@@ -152,7 +152,7 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("versions", "llvmlite 0.1"),
+        ("versions", "numba 0.1"),
         ("processor", "another one"),
     ],
 )

@@ -16,14 +16,16 @@ SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 wide = pytest.mark.skipif(not WIDE, reason="this processor has no vectors of 512 bits")
 
 
-@pytest.mark.parametrize("named", [{}, {"HPCCLEAR_CPU_FEATURES": "+avx2"}], ids=len)
+@pytest.mark.parametrize(
+    "named", [{}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "+avx2"}], ids=len
+)
 def test_another_width_is_refused(monkeypatch, tmp_path, named):
-    """Also where the user names the processor, and the width would say nothing."""
+    """Also where the user names the processor to Numba, and the width would say nothing."""
     monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "64")
     for name, value in named.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(InputError, match="256 or 512"):
-        width.processor()
+        width.features()
     answer = subprocess.run(
         [sys.executable, "-m", "hpcclear", "simulate", SCENE, "-o", tmp_path / "r.nc"],
         capture_output=True, text=True, timeout=300,

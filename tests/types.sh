@@ -16,7 +16,7 @@ for version in "$@"; do
         python -m venv --without-pip "$place" || exit 2
         packages=$("$place/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
         # The largest describe no types, so mypy reads nothing of them.
-        awk -v untyped='^(llvmlite|mpich|scikit-learn|scipy)==' '/^[a-z]/ { keep = $0 !~ untyped } keep' "$lock" >"$place/typed.txt"
+        awk -v untyped='^(llvmlite|mpich|numba|scikit-learn|scipy)==' '/^[a-z]/ { keep = $0 !~ untyped } keep' "$lock" >"$place/typed.txt"
         # nothing of it is ever run, so it may ask for another Python
         python -m pip -qq --disable-pip-version-check install --no-compile --no-deps --only-binary :all: --ignore-requires-python \
             --python-version "$version" --target "$packages" --require-hashes -r "$place/typed.txt" || exit 2

@@ -34,10 +34,10 @@ class CalledEquations:
     def __call__(self, time: float, y: Array) -> Array:
         """dy/dt, shape (2 n + joints,)."""
         self.calls += 1
-        derivative(*self._head, self.contacts, time, np.ascontiguousarray(y), *self._seen)
+        derivative(*self._head, self.contacts, time, y, *self._seen)
         return self._seen.rates.copy()
 
     def joints(self, time: float, y: Array) -> Array:
         """Gap, contact force and rate of the gap of every joint, shape (joints, 3)."""
-        derivative(*self._head, self.contacts, time, np.ascontiguousarray(y), *self._seen)
+        derivative(*self._head, self.contacts, time, y, *self._seen)
         return self._seen.joints

@@ -1,6 +1,7 @@
 """What is vectorised though no operator says it: bounds without a branch, bits of a double; arrays and functions at addresses.
 
-The lowering (`hpcclear.base.lowering.arithmetic`) has instructions of its own for these.
+The lowering (`hpcclear.base.lowering.arithmetic`) has instructions of its own for these. `hpcclear.base.cached` registers with
+Numba those that Numba compiles.
 """
 
 import struct

@@ -1,7 +1,8 @@
 """Where compiled code is kept: a private cache that notices every change of source.
 
-The folder's name holds a hash of all sources and of the versions that shape the code. What is in it runs, so it must belong to
-the user and be closed to others.
+Numba's own cache looks at one file only and serves stale code when a function in another file was edited. Here
+the folder's name holds a hash of all sources and of the versions that shape the code. The cache is pickle,
+so the folder must belong to the user and be closed to others.
 """
 
 import contextlib
@@ -13,9 +14,11 @@ from functools import cache
 from pathlib import Path
 
 import llvmlite
+import numba
 import numpy as np
 
-from hpcclear.base.private import private_folder
+from hpcclear.base.private import private_folder, refusal
+from hpcclear.base.remarks import remark
 
 
 def _compiled_sources(root: Path) -> list[Path]:
@@ -23,7 +26,7 @@ def _compiled_sources(root: Path) -> list[Path]:
     # of laws the texts are, each named by its content
     kernel = ("layout", "physics", "contacts", "linkage", "stepping")
     parts = {path for room in kernel for path in (root / "dynamics" / room).rglob("*.py")}
-    compiles = re.compile(rb"jit|llvmlite|lowering")  # or emits what is compiled
+    compiles = re.compile(rb"jit|numba|llvmlite|base\.cached")  # or emits what is compiled
     parts |= {path for path in root.rglob("*.py") if compiles.search(path.read_bytes())}
     names = ("numbered.py", "outcome.py", "unrolled.py")
     return sorted(parts | {root / "base" / name for name in names})
@@ -36,9 +39,9 @@ def source_key() -> str:
     Read again where a source was written since; reading all of them takes a fortieth of a start.
     """
     root = Path(__file__).parent.parent
-    versions = (llvmlite.__version__, np.__version__, platform.python_version())
+    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
     seen = hashlib.sha256(repr((str(root), versions, _listing(root))).encode()).hexdigest()
-    kept = _place() / "sources"
+    kept = _place()[0] / "sources"
     with contextlib.suppress(OSError, ValueError):
         before, key, check = kept.read_text().split()
         if before == seen and check == _check(seen, key):
@@ -78,14 +81,27 @@ def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
 
 
 @cache
-def _place() -> Path:
-    """This package's own folder: on node-local disk by default, ``HPCCLEAR_CACHE`` names another parent."""
-    return private_folder("HPCCLEAR_CACHE")
+def _place() -> tuple[Path, bool]:
+    """The user's ``NUMBA_CACHE_DIR`` and True, or where that is not the user's alone this package's own folder.
+
+    Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
+    """
+    named, why = os.environ.get("NUMBA_CACHE_DIR"), ""
+    if named:
+        own = Path(named).resolve()
+        why = refusal(own)
+        if not why:
+            return own, True
+    folder = private_folder("HPCCLEAR_CACHE")
+    if named:
+        remark(f"Warning: NUMBA_CACHE_DIR {named} {why}. Compiled code is kept in {folder}")
+    return folder, False
 
 
 @cache
 def chosen_folder() -> str:
-    """Return the folder of the compiled code of these sources, made if need be."""
-    folder = _place() / source_key()
+    """Return the folder of compiled code, made if need be: the user's, or one of these sources in this package's own."""
+    place, named = _place()
+    folder = place if named else place / source_key()
     folder.mkdir(mode=0o700, exist_ok=True)
     return str(folder)

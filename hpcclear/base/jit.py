@@ -1,7 +1,7 @@
 """How this package compiles: the decorators."""
 
 from collections.abc import Callable
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from typing import TypeVar
 
 FASTMATH = {"contract", "nsz", "arcp"}
@@ -21,17 +21,28 @@ def narrow_vectors() -> None:
 class KernelFunction:
     """A function of the kernel, for the lowering to write out where another of the same `kind` ("lane" or "scalar") calls it.
 
-    `py_func`: the function as it was defined, which Python calls; `targetoptions`: how it is compiled by itself; `apart`: see
-    there.
+    Where Python or a function of Numba's calls it, Numba compiles it with `targetoptions`, and is loaded for that only: a
+    fifth of the start of a command. `py_func`: the function as it was defined; `apart`: see there.
     """
 
     def __init__(self, function: Callable[..., object], kind: str, **options: object) -> None:
         update_wrapper(self, function)
         self.py_func, self.kind, self.targetoptions, self.apart = function, kind, options, False
 
+    @cached_property
+    def dispatcher(self) -> Callable[..., object]:
+        """The function as Numba compiles it; on disk only what Python calls one by one is kept."""
+        from hpcclear.base.cached import cached, inlined
+
+        return (inlined if self.kind == "lane" else cached)(self.py_func, **self.targetoptions)
+
     def __call__(self, *arguments: object) -> object:
-        """Call it as Python does."""
-        return self.py_func(*arguments)
+        """Call what Numba compiled."""
+        return self.dispatcher(*arguments)
+
+    @property
+    def _numba_type_(self) -> object:
+        return self.dispatcher._numba_type_  # type: ignore[attr-defined]
 
 
 def lane_function(function: Function, fastmath: set[str] = FASTMATH) -> Function:
@@ -50,6 +61,6 @@ def apart(compiled: Function) -> Function:
     return compiled
 
 
-def scalar_function(function: Function, **options: object) -> Function:
-    """Compile what runs for one lane or one point at a time; `options` may be ``fastmath``, the rewrites allowed in it."""
-    return KernelFunction(function, "scalar", **options)  # type: ignore[return-value]
+def scalar_function(function: Function) -> Function:
+    """Compile what runs for one lane or one point at a time."""
+    return KernelFunction(function, "scalar")  # type: ignore[return-value]

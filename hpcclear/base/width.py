@@ -33,18 +33,17 @@ def asked_width() -> int | None:
     return int(asked) if asked else None
 
 
-def processor() -> tuple[str, str]:
-    """Name and features of the processor that code is compiled for, as LLVM has them: this one with the width of its vectors,
-    or any with the features that ``HPCCLEAR_CPU_FEATURES`` names. Raises InputError as `asked_width`.
+def features() -> str | None:
+    """The processor's features as they are passed to Numba; None where there is nothing to choose.
+
+    Raises InputError as `asked_width`.
     """
-    asked, name = asked_width(), llvm.get_host_cpu_name()
-    if named := os.environ.get("HPCCLEAR_CPU_FEATURES"):
-        return "generic", named
+    asked = asked_width()
     known = llvm.get_host_cpu_features()
     if asked != 128 and not known.get("avx512f", False):
-        return name, known.flatten()
-    usual = 256 if name in SLOWED else 512
-    return name, f"{known.flatten()},{_PREFERENCE[asked or usual]}"
+        return None
+    usual = 256 if llvm.get_host_cpu_name() in SLOWED else 512
+    return f"{known.flatten()},{_PREFERENCE[asked or usual]}"
 
 
 def doubles_in_a_vector() -> int:

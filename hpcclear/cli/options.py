@@ -283,7 +283,7 @@ def is_root() -> bool:
     return launched_rank() in (0, None)
 
 
-SIMULATING = ("hpcclear.base.lowering.compiled", "hpcclear.scene", "hpcclear.dynamics.evaluation")
+SIMULATING = ("hpcclear.base.cached", "hpcclear.scene", "hpcclear.dynamics.evaluation")
 """What every rank of every such command loads, in pieces: between two it hears what root says."""
 
 STUDYING = (*SIMULATING, "hpcclear.ensemble.compiling", "hpcclear.study")

@@ -87,7 +87,7 @@ def digest(text: str) -> str:
 
 
 class _Loader(importlib.abc.InspectLoader):
-    """Runs a text; tracebacks and `inspect` find its lines here."""
+    """Runs a text; tracebacks, `inspect` and Numba find its lines here."""
 
     def __init__(self, text: str, path: str) -> None:
         self.text, self.path = text, path

@@ -111,7 +111,7 @@ def end_job(complaint: str, code: int) -> None:
 
 
 def pin_threads() -> None:
-    """Keep BLAS and OpenMP of this process to one thread.
+    """Keep BLAS, OpenMP and Numba of this process to one thread.
 
     Ranks share a node's cores, and sums over several threads differ in the last bit. Libraries that
     are not loaded yet read the environment; those that are get informed.
@@ -124,3 +124,7 @@ def pin_threads() -> None:
             importlib.import_module("threadpoolctl").threadpool_limits(1)
         finally:
             sys.unraisablehook = hook
+    if "numba" in sys.modules:
+        sys.modules["numba"].set_num_threads(1)
+    else:  # Numba refuses a change of this variable once its threads run
+        os.environ["NUMBA_NUM_THREADS"] = "1"

@@ -7,7 +7,7 @@ from importlib import metadata
 
 from hpcclear.base import host
 
-_PACKAGES = ("numpy", "scipy", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
 
 
 @functools.cache

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import last_bits
 import threadpoolctl  # noqa: F401
+from numba.core.registry import cpu_target
 
 import hpcclear
 from hpcclear import cli, scene
@@ -136,6 +137,12 @@ def load() -> None:
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
     identity.sample_key(shipped, samples.design(shipped, None))
     checks.registry()
+    # which of them keeps Numba to one thread is found later
+    for layer in ("tbbpool", "omppool", "workqueue"):
+        with contextlib.suppress(ImportError):
+            importlib.import_module(f"numba.np.ufunc.{layer}")
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
 
 
 if __name__ == "__main__":

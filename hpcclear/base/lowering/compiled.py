@@ -2,44 +2,26 @@
 
 import ctypes
 import linecache
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import llvmlite.binding as llvm
 from llvmlite import ir
+from numba.core.registry import cpu_target
 
 from hpcclear.base import kept
+from hpcclear.base.cached import features_in_use
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.lowering.statements import Function, definition_of
 from hpcclear.base.lowering.values import DOUBLE, WHOLE, Flags, Kind, Value, flat, kind_of, types_of
-from hpcclear.base.width import doubles_in_a_vector, processor
+from hpcclear.base.width import doubles_in_a_vector
 
 
-@cache
-def features_in_use() -> str:
-    """Features of the processor that code is compiled for, as LLVM names them."""
-    return processor()[1]
-
-
-@cache
 def _target() -> llvm.TargetMachine:
-    """The processor that code is for, and how an engine that runs it at once takes it."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    triple = llvm.get_process_triple()
-    placed = "static" if triple.startswith("x86") else "default"
-    return llvm.Target.from_triple(triple).create_target_machine(
-        processor()[0], features_in_use(), opt=3, reloc=placed, codemodel="jitdefault", jit=True
-    )
-
-
-@cache
-def _engine() -> llvm.ExecutionEngine:
-    """What keeps the machine code of this process."""
-    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
+    """The processor that code is for, as Numba has it: with the features of `hpcclear.base.width` or of the user's settings."""
+    return cpu_target.target_context.codegen()._tm
 
 
 @contextmanager
@@ -87,7 +69,9 @@ class _Program:
 
         def call(other: Value, kinds: tuple[Kind, ...]) -> tuple[str, Kind]:
             options = other.targetoptions
-            fast = options.get("fastmath", flags)  # of its caller where it says nothing
+            fast = options.get(
+                "fastmath", flags
+            )  # as with Numba: of its caller where it says nothing
             key = other, kinds, frozenset(fast)
             if key not in self.known:
                 own = f"{self.name}.{other.__name__}.{len(self.known)}"
@@ -188,7 +172,9 @@ class Compiled:
             return bytes(_target().emit_object(module))
 
         code = kept.made(path, compiled)
-        engine = _engine()
+        engine = (
+            cpu_target.target_context.codegen()._engine._ee
+        )  # which keeps the machine code of this process
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         self.address = int(engine.get_function_address(name))
@@ -199,16 +185,3 @@ class Compiled:
     def __call__(self, *arguments: object) -> Value:
         """Call it with Python's numbers, and arrays by their addresses."""
         return self._call(*flat(arguments))
-
-
-def at_first_call(function: Value, flags: Flags = (), result: Value = None) -> Callable[..., Value]:
-    """A function that is compiled for the kinds of its arguments once it is called with them; arrays in C order."""
-    known: dict[tuple[Kind, ...], Compiled] = {}
-
-    def called(*arguments: Value) -> Value:
-        kinds = tuple(map(kind_of, arguments))
-        if kinds not in known:
-            known[kinds] = Compiled(function, kinds, flags, result)
-        return known[kinds](*arguments)
-
-    return called

@@ -1,4 +1,4 @@
-"""The motion of one lane of any linkage as a text: what a compiled function of it does, and what one reads to understand it.
+"""The motion of one lane of any linkage as a text: what a numba function of it does, and what one reads to understand it.
 
 The text reads coordinates and velocities of the stage, calls the contact law of each joint with clearance, and writes
 accelerations, gaps, forces and powers; an effect that is off is not in it. It is written in the order kinematics,

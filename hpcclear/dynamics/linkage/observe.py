@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
-from hpcclear.base.lowering.compiled import Compiled, at_first_call
+from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import run_motion
@@ -92,7 +92,7 @@ def new_seen(n: int, par: Array, joints: int = 2) -> Derivative:
 
 
 @scalar_function
-def _derivative(motion, tables, contacts, time, y, out, joints, lane):
+def derivative(motion, tables, contacts, time, y, out, joints, lane):
     """Rates of y = (coordinates, velocities, integrals of the absolute gaps) at `time` since the start of the revolution.
 
     `motion`: address of a motion of one lane; `contacts`: whether each joint is `latched`, then 1/d'_0 of each. Others as in
@@ -108,6 +108,3 @@ def _derivative(motion, tables, contacts, time, y, out, joints, lane):
         for m in range(3):
             joints[j, m] = lane[at.RATE_NOW + at.GAP + m * at.MAX_JOINTS + j]
         out[2 * n + j] = abs(joints[j, OPEN])
-
-
-derivative = at_first_call(_derivative)

@@ -1,7 +1,5 @@
 """Sets of non-dominated points: archive, spread, hypervolume. All objectives are minimised."""
 
-import ctypes
-import math
 from dataclasses import dataclass
 
 import moocore
@@ -9,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Booleans, Integers
-from hpcclear.base.jit import scalar_function
-from hpcclear.base.lowering.compiled import at_first_call
+from hpcclear.base.cached import cached
 
 
 @dataclass(frozen=True)
@@ -149,128 +146,104 @@ def best_subset(values: Array, size: int) -> NDArray[np.intp]:
     return np.sort(_best_of_two(values, size))
 
 
+@cached
 def _best_of_two(values: Array, size: int) -> Integers:
     """Rows of the largest area below the first row's second objective, from the last row to the first."""
-    order, count = np.argsort(values[:, 0], kind="stable"), len(values)
+    order = np.argsort(values[:, 0])
+    first, second = values[order, 0], values[order, 1]
+    count = len(order)
+    won = np.full(count, -np.inf)  # from row i to the last one with as many rows as were chosen
+    won[-1] = 0.0
     follower = np.zeros((size, count), np.int64)
-    first, second = np.ascontiguousarray(values[order].T)
-    _compiled_followers(first, second, np.full((size, count), -np.inf), follower)
+    for chosen in range(1, size):
+        longer = np.full(count, -np.inf)
+        for i in range(count - chosen):
+            height = second[0] - second[i]
+            for j in range(i + 1, count - chosen + 1):
+                area = (first[j] - first[i]) * height + won[j]
+                if area > longer[i]:
+                    longer[i] = area
+                    follower[chosen, i] = j
+        won = longer
     kept = np.zeros(size, np.int64)
     for k in range(1, size):
         kept[k] = follower[size - k, kept[k - 1]]
     return order[kept]
 
 
-@scalar_function
-def _followers(first, second, won, follower):
-    """The row behind each row (size, n) with so many rows behind it; `won`: area from it to the last one, -inf at first."""
-    size, count = len(follower), len(first)
-    won[0, count - 1] = 0.0
-    for chosen in range(1, size):
-        for i in range(count - chosen):
-            height = second[0] - second[i]
-            for j in range(i + 1, count - chosen + 1):
-                area = (first[j] - first[i]) * height + won[chosen - 1, j]
-                if area > won[chosen, i]:
-                    won[chosen, i] = area
-                    follower[chosen, i] = j
-
-
+@cached
 def _cut_two(values: Array, size: int) -> Booleans:
     """Rows to keep of a two-objective front: the least rectangle between neighbours goes first.
 
     Scaling an objective scales all rectangles alike and both ends stay: no reference is needed.
     """
-    order = np.argsort(values[:, 0], kind="stable")
-    kept = np.arange(len(order))
-    first, second = np.ascontiguousarray(values[order].T)
-    left = _compiled_least_gone(first, second, kept, size)
-    alive = np.zeros(len(order), np.bool_)
-    alive[order[kept[:left]]] = True
+    order = np.argsort(values[:, 0])
+    alive = np.ones(len(values), np.bool_)
+    while len(order) > size:
+        first, second = values[order, 0], values[order, 1]
+        area = (first[2:] - first[1:-1]) * (second[:-2] - second[1:-1])
+        gone = 1 + np.argmin(area)
+        alive[order[gone]] = False
+        order = np.concatenate((order[:gone], order[gone + 1 :]))
     return alive
 
 
-@scalar_function
-def _least_gone(first, second, kept, size):
-    """Move the rows that stay to the front of `kept`; how many they are."""
-    count = len(kept)
-    while count > size:
-        gone, least = 1, math.inf
-        for k in range(1, count - 1):
-            a, b, c = kept[k - 1], kept[k], kept[k + 1]
-            area = (first[c] - first[b]) * (second[a] - second[b])
-            if area < least:
-                gone, least = k, area
-        count -= 1
-        for k in range(gone, count):
-            kept[k] = kept[k + 1]
-    return count
-
-
+@cached
 def _thin(values: Array, capacity: int) -> tuple[Booleans, Array]:
     """Drop the most crowded rows until `capacity` are left; the best of each objective stays.
 
     Returns which rows are alive, and of these the distance to the nearest neighbour, objectives
     scaled to their extent.
     """
-    count = len(values)
-    extent = np.ptp(values, axis=0)
-    columns = np.ascontiguousarray(values / np.where(extent > 0.0, extent, 1.0))
-    pinned, alive = np.zeros(count, np.int64), np.ones(count, np.int64)
-    pinned[values.argmin(axis=0)] = 1
-    distance = np.empty((count, 2))
-    neighbour = np.empty((count, 2), np.int64)
+    count, objectives = values.shape
     square = np.zeros((count, count))
-    _compiled_thinned(columns, square, pinned, alive, distance, neighbour, count - capacity)
-    return alive == 1, np.sqrt(distance[alive == 1, 0])
-
-
-@scalar_function
-def _thinned(columns, square, pinned, alive, distance, neighbour, drops):
-    """Mark `drops` rows as not alive; squares of the distances, and the two nearest rows with theirs, are kept on the way."""
-    count = len(alive)
-    for k in range(columns.shape[1]):
+    pinned = np.zeros(count, np.bool_)
+    for k in range(objectives):
+        column = values[:, k].copy()
+        pinned[np.argmin(column)] = True
+        extent = column.max() - column.min()
+        if extent > 0.0:
+            column = column / extent
         for i in range(count):
             for j in range(i):
-                step = columns[i, k] - columns[j, k]
-                square[i, j] += step * step
+                square[i, j] += (column[i] - column[j]) ** 2
+    alive = np.ones(count, np.bool_)
+    distance = np.full((count, 2), np.inf)
+    neighbour = np.full((count, 2), -1)
     for i in range(count):
-        square[i, i] = math.inf
+        square[i, i] = np.inf
         for j in range(i):
             square[j, i] = square[i, j]
     for i in range(count):
         _nearest(square, alive, i, distance, neighbour)
-    for _ in range(drops):
+    for _ in range(count - capacity):
         gone = -1
         for i in range(count):
-            if alive[i] == 1 and pinned[i] == 0 and (gone < 0 or _closer(distance, i, gone)):
+            if alive[i] and not pinned[i] and (gone < 0 or _closer(distance, i, gone)):
                 gone = i
-        alive[gone] = 0
+        alive[gone] = False
         for i in range(count):
-            if alive[i] == 1 and (neighbour[i, 0] == gone or neighbour[i, 1] == gone):
+            if alive[i] and (neighbour[i, 0] == gone or neighbour[i, 1] == gone):
                 _nearest(square, alive, i, distance, neighbour)
+    return alive, np.sqrt(distance[alive, 0])
 
 
-@scalar_function
-def _closer(distance, i, j):
-    tied = distance[i, 0] == distance[j, 0]
-    return distance[i, 1] < distance[j, 1] if tied else distance[i, 0] < distance[j, 0]
+@cached
+def _closer(distance: Array, i: int, j: int) -> bool:
+    if distance[i, 0] != distance[j, 0]:
+        return bool(distance[i, 0] < distance[j, 0])
+    return bool(distance[i, 1] < distance[j, 1])
 
 
-@scalar_function
-def _nearest(square, alive, i, distance, neighbour):
+@cached
+def _nearest(square: Array, alive: Booleans, i: int, distance: Array, neighbour: Integers) -> None:
     """Write the two nearest living neighbours of row i."""
-    distance[i, 0], distance[i, 1] = math.inf, math.inf
-    neighbour[i, 0], neighbour[i, 1] = -1, -1
+    distance[i, :] = np.inf
+    neighbour[i, :] = -1
     for j in range(len(alive)):
-        if alive[j] == 1 and j != i:
+        if alive[j] and j != i:
             if square[i, j] < distance[i, 0]:
                 distance[i, 1], neighbour[i, 1] = distance[i, 0], neighbour[i, 0]
                 distance[i, 0], neighbour[i, 0] = square[i, j], j
             elif square[i, j] < distance[i, 1]:
                 distance[i, 1], neighbour[i, 1] = square[i, j], j
-
-
-_compiled_followers, _compiled_least_gone, _compiled_thinned = (
-    at_first_call(_followers), at_first_call(_least_gone, result=ctypes.c_int64), at_first_call(_thinned),
-)  # fmt: skip

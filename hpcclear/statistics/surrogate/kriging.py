@@ -24,7 +24,7 @@ from scipy.linalg import cho_factor, cho_solve
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel, correlation
 from hpcclear.statistics.surrogate.leaf import Columns, inside
-from hpcclear.statistics.surrogate.predictor import gaussian, kernel_sum, matern, pad
+from hpcclear.statistics.surrogate.predictor import kernel_sum, matern_sum, pad
 
 COLUMNS: Columns = {
     "weight": ("point", "alpha"),
@@ -132,10 +132,9 @@ class Kriging:
         Raises InputError: a point lies outside the box (or is NaN): the model does not extrapolate.
         """
         points = inside(points, self.names, self.lower, self.upper)
-        kernel = gaussian if self.kernel == SQUARED_EXPONENTIAL else matern
-        scaled, weights = self.packed
-        return kernel_sum(
-            kernel, self.to_unit(points), scaled, self.length_scales, weights, self.mean
+        summed = kernel_sum if self.kernel == SQUARED_EXPONENTIAL else matern_sum
+        return summed(
+            self.to_unit(points), self.packed[0], self.length_scales, self.packed[1], self.mean
         )
 
     def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:

@@ -1,19 +1,17 @@
 """Compiled sums of kernels: Kriging means, and of the squared exponential their moments over tensor rules.
 
 Everything runs along the training points, the one long dimension, so that a design's result does
-not depend on which other designs are in the batch. The polynomial exponential of `hpcclear.base.exponentials` lets LLVM keep
-these loops in vector registers.
+not depend on which other designs are in the batch. Numba has no vectorised exponential of its own;
+the polynomial one of `hpcclear.base.exponentials` lets LLVM keep these loops in vector registers.
 """
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.cached import cached
 from hpcclear.base.exponentials import falling
-from hpcclear.base.jit import apart, scalar_function
-from hpcclear.base.lowering.compiled import at_first_call
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
@@ -25,26 +23,27 @@ LANES = 8
 """Training points are padded to a multiple of this, so that vectorised loops have no tail."""
 
 
-@scalar_function
-def gaussian(square):
+@partial(cached, fastmath={"contract"})
+def gaussian(square: float) -> float:
     """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise."""
-    return falling(0.5 * square, STEEPEST)
+    return float(falling(0.5 * square, STEEPEST))
 
 
-@scalar_function
-def matern(square):
+@partial(cached, fastmath={"contract"})
+def matern(square: float) -> float:
     """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`."""
     step = np.sqrt(5.0 * square)
-    return (1.0 + step + step * step / 3.0) * falling(step, STEEPEST)
+    return float((1.0 + step + step * step / 3.0) * falling(step, STEEPEST))
 
 
-@scalar_function
-def _squares_row(scaled, lengths, dims, coordinates, row):
+@partial(cached, fastmath={"contract"})
+def _squares_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """Fill `row` with squared distances over the inputs `dims`, a place against all training points."""
-    count = len(row)
-    for i in range(count):
-        row[i] = 0.0
-    for k in range(len(dims)):
+    count = row.size
+    row[:] = 0.0
+    for k in range(dims.size):
         place = coordinates[k] / lengths[dims[k]]
         inputs = scaled[dims[k]]
         for i in range(count):
@@ -52,66 +51,51 @@ def _squares_row(scaled, lengths, dims, coordinates, row):
             row[i] += step * step
 
 
-@apart
-@partial(scalar_function, fastmath={"contract"})
-def _kernel_row(scaled, lengths, dims, coordinates, row):
+@partial(cached, fastmath={"contract"})
+def _kernel_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """The same with the squared exponential of these distances."""
     _squares_row(scaled, lengths, dims, coordinates, row)
-    for i in range(len(row)):
+    for i in range(row.size):
         row[i] = gaussian(row[i])
 
 
-@apart
-@partial(scalar_function, fastmath={"contract"})
-def _matern_row(scaled, lengths, dims, coordinates, row):
-    """The same with the Matern function."""
-    _squares_row(scaled, lengths, dims, coordinates, row)
-    for i in range(len(row)):
-        row[i] = matern(row[i])
-
-
-@apart
-@partial(scalar_function, fastmath=REORDER)
-def _dot(a, b):
+@partial(cached, fastmath=REORDER)
+def _dot(a: Array, b: Array) -> float:
     total = 0.0
-    for i in range(len(a)):
+    for i in range(a.size):
         total += a[i] * b[i]
     return total
 
 
-@scalar_function
-def _kernel_sum(unit, scaled, lengths, dims, weights, level, row, out):
-    for j in range(len(out)):
-        _kernel_row(scaled, lengths, dims, unit[j], row)
-        out[j] = level + _dot(weights, row)
-
-
-@scalar_function
-def _matern_sum(unit, scaled, lengths, dims, weights, level, row, out):
-    for j in range(len(out)):
-        _matern_row(scaled, lengths, dims, unit[j], row)
-        out[j] = level + _dot(weights, row)
-
-
-_SUMS = {gaussian: at_first_call(_kernel_sum), matern: at_first_call(_matern_sum)}
-
-
-def kernel_sum(
-    kernel: Callable[..., object],
-    unit: Array,
-    scaled: Array,
-    lengths: Array,
-    weights: Array,
-    level: float,
-) -> Array:
-    """Kriging means ``level + sum_i weights_i k(x, x_i)`` at places (n, d) in the unit cube, (n,); `gaussian` or `matern`.
+@cached
+def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
+    """Kriging means ``level + sum_i weights_i k(x, x_i)`` at places (n, d) in the unit cube, (n,).
 
     `scaled` (d, p): training points in the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,):
     in the units of the answer.
     """
-    row, out = np.empty(weights.size), np.empty(len(unit))
-    unit, dims = np.ascontiguousarray(unit), np.arange(lengths.size)
-    _SUMS[kernel](unit, scaled, lengths, dims, weights, float(level), row, out)
+    dims = np.arange(lengths.size)
+    row = np.empty(weights.size)
+    out = np.empty(unit.shape[0])
+    for j in range(unit.shape[0]):
+        _kernel_row(scaled, lengths, dims, unit[j], row)
+        out[j] = level + _dot(weights, row)
+    return out
+
+
+@cached
+def matern_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
+    """`kernel_sum` with the Matern function of order 5/2: places (n, d), scaled (d, p), lengths (d,), weights (p,) to (n,)."""
+    dims = np.arange(lengths.size)
+    row = np.empty(weights.size)
+    out = np.empty(unit.shape[0])
+    for j in range(unit.shape[0]):
+        _squares_row(scaled, lengths, dims, unit[j], row)
+        for i in range(row.size):
+            row[i] = matern(row[i])
+        out[j] = level + _dot(weights, row)
     return out
 
 
@@ -124,19 +108,18 @@ def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return transposed, filled
 
 
-@scalar_function
-def _multiply(a, b, out):
-    for i in range(len(out)):
+@cached
+def _multiply(a: Array, b: Array, out: Array) -> None:
+    for i in range(out.size):  # written out: an array expression would allocate
         out[i] = a[i] * b[i]
 
 
-@apart
-@partial(scalar_function, fastmath=REORDER)
-def _four_dots(table, first, row, out, at):
+@partial(cached, fastmath=REORDER)
+def _four_dots(table: Array, first: int, row: Array, out: Array, at: int) -> None:
     """``out[at + k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     t0, t1, t2, t3 = table[first], table[first + 1], table[first + 2], table[first + 3]
-    for i in range(len(row)):
+    for i in range(row.size):
         a += t0[i] * row[i]
         b += t1[i] * row[i]
         c += t2[i] * row[i]
@@ -144,57 +127,18 @@ def _four_dots(table, first, row, out, at):
     out[at], out[at + 1], out[at + 2], out[at + 3] = a, b, c, d
 
 
-@apart
-@partial(scalar_function, fastmath=REORDER)
-def _weighted_moments(values, weights):
+@partial(cached, fastmath=REORDER)
+def _weighted_moments(values: Array, weights: Array) -> tuple[float, float]:
     """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
     mean, variance = 0.0, 0.0
-    for k in range(len(values)):
+    for k in range(values.size):
         mean += weights[k] * values[k]
-    for k in range(len(values)):
-        step = values[k] - mean
-        variance += weights[k] * (step * step)
+    for k in range(values.size):
+        variance += weights[k] * (values[k] - mean) ** 2
     return mean, variance
 
 
-@scalar_function
-def _tensor_moments(
-    places, shares, counts, starts, dims, steady, steady_shares, scaled, lengths,
-    table, stack, digits, first, chance, values, weights, out,
-):  # fmt: skip
-    groups, still = len(counts), len(steady_shares)
-    total = len(values) // still
-    for j in range(len(out)):
-        at, place = 0, places[j]
-        for k in range(groups):
-            width = starts[k + 1] - starts[k]
-            inputs = dims[starts[k] : starts[k + 1]]
-            for node in range(first[k], first[k + 1]):
-                _kernel_row(scaled, lengths, inputs, place[at : at + width], table[node])
-                at += width
-        for k in range(groups):
-            digits[k] = 0
-        changed = 0
-        for node in range(total):
-            for k in range(changed, groups):
-                line = first[k] + digits[k]
-                _multiply(stack[k], table[line], stack[k + 1])
-                chance[k + 1] = chance[k] * shares[j, line]
-            for q in range(0, still, 4):
-                _four_dots(steady, q, stack[groups], values, node * still + q)
-            for q in range(still):
-                weights[node * still + q] = chance[groups] * steady_shares[q]
-            changed = groups - 1
-            while changed > 0 and digits[changed] == counts[changed] - 1:
-                digits[changed] = 0
-                changed -= 1
-            digits[changed] += 1
-        out[j, 0], out[j, 1] = _weighted_moments(values, weights)
-
-
-_compiled_moments = at_first_call(_tensor_moments)
-
-
+@cached
 def tensor_moments(
     places: Array, shares: Array, counts: Integers, starts: Integers, dims: Integers, steady: Array, steady_shares: Array,
     scaled: Array, lengths: Array,
@@ -211,11 +155,44 @@ def tensor_moments(
     rows of the q steady nodes (padded to a multiple of 4); `steady_shares` (q,): their probabilities (0 for padding). Others
     as in `kernel_sum`.
     """
-    groups, size = counts.size, scaled.shape[1]
-    tables = np.empty((counts.sum(), size)), np.ones((groups + 1, size))
-    digits, first = np.zeros(groups, np.int64), np.cumsum([0, *counts])
-    chance, out = np.ones(groups + 1), np.empty((len(places), 2))
-    sums = np.empty((2, int(np.prod(counts)) * len(steady)))
-    given = map(np.ascontiguousarray, (places, shares, counts, starts, dims, steady, steady_shares))
-    _compiled_moments(*given, scaled, lengths, *tables, digits, first, chance, *sums, out)
+    groups, size, still = counts.size, scaled.shape[1], steady.shape[0]
+    table, stack = np.empty((counts.sum(), size)), np.empty((groups, size))
+    digits, first = np.zeros(groups, np.int64), np.zeros(groups + 1, np.int64)
+    first[1:] = np.cumsum(counts)
+    total = 1
+    for k in range(groups):
+        total *= counts[k]
+    chance = np.empty(groups)
+    values, weights = np.empty(total * still), np.empty(total * still)
+    out = np.empty((places.shape[0], 2))
+    for j in range(places.shape[0]):
+        at = 0
+        for k in range(groups):
+            width = starts[k + 1] - starts[k]
+            inputs = dims[starts[k] : starts[k + 1]]
+            for node in range(first[k], first[k + 1]):
+                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], table[node])
+                at += width
+        digits[:] = 0
+        changed = 0
+        for node in range(total):
+            for k in range(changed, groups):
+                line = first[k] + digits[k]
+                if k == 0:
+                    stack[0] = table[line]
+                    chance[0] = shares[j, line]
+                else:
+                    _multiply(stack[k - 1], table[line], stack[k])
+                    chance[k] = chance[k - 1] * shares[j, line]
+            product = stack[groups - 1]
+            for q in range(0, still, 4):
+                _four_dots(steady, q, product, values, node * still + q)
+            for q in range(still):
+                weights[node * still + q] = chance[groups - 1] * steady_shares[q]
+            changed = groups - 1
+            while changed > 0 and digits[changed] == counts[changed] - 1:
+                digits[changed] = 0
+                changed -= 1
+            digits[changed] += 1
+        out[j] = _weighted_moments(values, weights)
     return out
