@@ -3,15 +3,19 @@
     python analysis/terminal.py [--before PROGRAM] [--keep DIRECTORY]
 
 PROGRAM is the Python of an environment with the other version; DIRECTORY gets what the commands of this one print. Runs short
-jobs, prints a row a command, and writes ``analysis/results/terminal.csv``. What a terminal shows counts, notes and the last
-line of progress as well. Help is left out.
+jobs, prints a row a command, and writes ``analysis/results/terminal.csv``. What is left on a terminal counts, notes as well; a
+line of progress is replaced by what follows. Help is left out.
 """
 
 import argparse
+import os
+import pty
+import re
 import shlex
 import subprocess
 import sys
 import tempfile
+import termios
 from pathlib import Path
 
 from recorded import record
@@ -48,16 +52,44 @@ COMMANDS = (
     "plot response/response.nc -o figures",
     "export samples/samples.nc -o samples.csv",
     "export response/response.nc -o response.csv",
-    "compare JOBS/slider_crank.toml response.csv",
+    "compare response/response.nc response.csv",
     "reproduce study --crate",
 )
 """Commands in the order in which later ones need files of earlier ones."""
 
 
-def extent(text: str) -> tuple[int, int]:
-    """Lines and columns on a terminal: of a line that is drawn again only its last state is left."""
-    lines = [line.rsplit("\r", 1)[-1] for line in text.rstrip().splitlines()]
-    return len(lines), max(map(len, lines), default=0)
+def left(words: list[str], place: str) -> tuple[int, str]:
+    """Exit code of a command, and what it leaves on a terminal."""
+    screen, line = pty.openpty()
+    termios.tcsetwinsize(line, (LINES, COLUMNS))
+    job = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=line, stderr=line, cwd=place)
+    os.close(line)
+    seen = b""
+    try:
+        while piece := os.read(screen, 4096):
+            seen += piece
+    except OSError:  # how Linux says that the other side was closed
+        pass
+    os.close(screen)
+    return job.wait(), shown(seen.decode())
+
+
+def shown(written: str) -> str:
+    """What a terminal shows in the end, which draws lines again where it is told to."""
+    rows, row, column = [""], 0, 0
+    for piece in re.split(r"(\n|\r|\x1b\[[0-9;?]*[A-Za-z])", written):
+        if piece == "\n":
+            row += 1
+            rows += [""] * (row == len(rows))
+        elif piece == "\r":
+            column = 0
+        elif piece.startswith("\x1b"):
+            row -= int(piece[2:-1] or 1) if piece.endswith("A") else 0
+            rows[row] = "" if piece.endswith("2K") else rows[row]
+        else:
+            rows[row] = f"{rows[row][:column]:{column}}{piece}{rows[row][column + len(piece) :]}"
+            column += len(piece)
+    return "\n".join(rows).rstrip()
 
 
 def answers(program: str, keep: Path | None = None) -> dict[str, tuple[int, int]]:
@@ -66,17 +98,15 @@ def answers(program: str, keep: Path | None = None) -> dict[str, tuple[int, int]
     with tempfile.TemporaryDirectory() as place:
         for command in COMMANDS:
             words = shlex.split(command.replace("JOBS", str(ROOT / "jobs")))
-            done = subprocess.run(
-                [program, "-m", "hpcclear", *words],
-                cwd=place, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-            )  # fmt: skip
-            if done.returncode not in (0, 4):
-                print(f"{command}: exit code {done.returncode}\n{done.stdout}", file=sys.stderr)
+            code, text = left([program, "-m", "hpcclear", *words], place)
+            if code not in (0, 4):
+                print(f"{command}: exit code {code}\n{text}", file=sys.stderr)
                 continue
-            found[command] = extent(done.stdout)
+            lines = text.splitlines()
+            found[command] = len(lines), max(map(len, lines), default=0)
             if keep:
                 keep.mkdir(parents=True, exist_ok=True)
-                (keep / f"{len(found):02d}.txt").write_text(f"{command}\n{done.stdout}")
+                (keep / f"{len(found):02d}.txt").write_text(f"{command}\n{text}")
             print(*found[command], command, flush=True)
     return found
 

@@ -4,8 +4,10 @@ import io
 import os
 import pathlib
 import pty
+import re
 import subprocess
 import sys
+import termios
 
 import numpy as np
 import pytest
@@ -14,6 +16,8 @@ from patience import crowded
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.progress import Progress
 
+ROOT = pathlib.Path(__file__).parents[1]
+SHORT = ["--set", "numerics.transient_revolutions=1", "--set", "numerics.averaged_revolutions=2"]
 PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 
@@ -58,11 +62,11 @@ def test_quiet_writes_nothing_and_an_empty_design_is_complete():
     assert log.getvalue() == "none: 0/0 (100 %), 0 samples/s in 0 s\n"
 
 
-def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
-    """What a program writes on a terminal; its standard error may go elsewhere."""
+def run_on_a_terminal(command: list[str], errors: int | None = None, cwd=None) -> str:
+    """What a program writes on a terminal of 24 lines of 80 columns; its standard error may go elsewhere."""
     screen, line = pty.openpty()
-    root = str(PROGRAM.parent.parent.parent)
-    environment = os.environ | {"PYTHONPATH": root, "TERM": "xterm", "COLUMNS": "120"}
+    termios.tcsetwinsize(line, (24, 80))
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "TERM": "xterm"}
     environment.pop("SLURM_JOB_ID", None)
     job = subprocess.Popen(
         command,
@@ -70,6 +74,7 @@ def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
         stdout=line,
         stderr=line if errors is None else errors,
         env=environment,
+        cwd=cwd,
     )
     os.close(line)
     seen = b""
@@ -80,16 +85,49 @@ def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
         pass
     finally:
         os.close(screen)
-    assert job.wait(timeout=crowded(30)) == 0
+    assert job.wait(timeout=crowded(30)) == 0, seen
     return seen.decode()
+
+
+def left_of(seen: str) -> list[str]:
+    """Lines that a terminal shows in the end: of one that is drawn again its last state, without colours."""
+    lines = [line.rstrip("\r").rpartition("\r")[2] for line in seen.rstrip().split("\n")]
+    return [re.sub(r"\x1b\[[0-9;]*[A-Za-z]", "", line) for line in lines]
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("launch", [[], [str(MPIEXEC), "-n", "2"]])
 def test_a_person_at_a_terminal_sees_a_bar_also_through_mpiexec(launch):
     seen = run_on_a_terminal([*launch, sys.executable, str(PROGRAM)])
-    assert "━" in seen
-    assert "sampling: 150/150 (100 %), 21 failed" in seen
+    assert re.search(r"sampling: \d+/150 \(\d+ %\), \d+ failed.*━", seen)
+    assert left_of(seen) == [""]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("scene", ["quickstart", "linkages/v_twin", "tolerances", "wear"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["simulate", "-o", "one.nc"],
+        ["sample", "-o", "some.nc", "--set", "study.samples=16"],
+        ["check"],
+    ],
+    ids=lambda words: words[0],
+)
+@pytest.mark.shortened(2)
+def test_a_terminal_shows_at_most_24_lines_of_80_columns_and_no_note_twice(words, scene, tmp_path):
+    """Notes and progress count."""
+    command, *options = words
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    asked = [command, f"jobs/{scene}.toml", *options, *SHORT]
+    launch = [str(MPIEXEC), "-n", "2"] if command == "sample" else []
+    lines = left_of(
+        run_on_a_terminal([*launch, sys.executable, "-m", "hpcclear", *asked], cwd=tmp_path)
+    )
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    notes = [line for line in lines if line.startswith(("Note", "Warning"))]
+    assert len(notes) == len(set(notes))
 
 
 @pytest.mark.mpi

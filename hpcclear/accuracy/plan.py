@@ -24,9 +24,10 @@ from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.steady import wording
 from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.ranks.progress import Progress, Style, duration
+from hpcclear.ranks.progress import Progress, duration
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of

@@ -28,6 +28,7 @@ from hpcclear.cli import commands
 from hpcclear.cli.options import GROUPS, Command, is_root, say
 from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
+from hpcclear.ranks.terminal import clear
 
 OLD = {
     "import": "init --import",
@@ -169,4 +170,5 @@ def main(arguments: list[str] | None = None) -> None:
                 raise
             say(f"Error: {known}")
             code = Exit.BAD_INPUT if isinstance(known, InputError) else Exit.FAILED
+    clear()
     sys.exit(int(code or 0))

@@ -14,14 +14,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
 from hpcclear.ranks.launcher import launched_rank
 from hpcclear.ranks.stopping import Exit, StopSwitch
+from hpcclear.ranks.terminal import clear, write
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Options
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
-
-WIDTH = 80
-"""Columns of what is printed."""
 
 PATH = click.Path(path_type=Path, readable=False)  # an unreadable file is reported where it is read
 FILE = click.argument("file", type=PATH)
@@ -308,10 +306,11 @@ def on_ranks(
 
 def show(text: str) -> None:
     """Print a line on standard output."""
+    clear()
     click.echo(plain(text))
 
 
 def say(text: str) -> None:
-    """Print a line on standard error, from root only."""
+    """Print a text on standard error, from root only: one line in a log, lines of 80 columns on a terminal."""
     if is_root():
-        click.echo(plain(text), err=True)
+        write(text)

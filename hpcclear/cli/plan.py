@@ -11,9 +11,10 @@ from hpcclear.cli.options import detailed
 from hpcclear.cli.tables import console
 from hpcclear.cli.terminal import counted, show_rows
 from hpcclear.ranks.progress import duration
+from hpcclear.ranks.terminal import WIDTH
 
-ON_SCREEN = ("memory", "simulations")
-"""Needs of a job that are printed without ``--details``; its time is in the table above."""
+ON_SCREEN = "memory"
+"""Need of a job that is printed without ``--details``; its time is in the table above."""
 
 RESERVE = 1.5
 """Requested wall time over expected wall time."""
@@ -26,7 +27,7 @@ def preview(plan: Plan, ranks: int) -> str:
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
     name = f"first look, {name}" if plan.first else name
     doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
-    doubts += ["probably less: a short batch leaves lanes idle"] if plan.first else []
+    doubts += ["probably less"] if plan.first else []
     return (
         f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
         f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"
@@ -67,12 +68,14 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
         )
     out.print(made)
     needs = _needs(plan, row, simulations, command, ranks)
-    show_rows("The job", needs if detailed() else [one for one in needs if one[0] in ON_SCREEN])
+    show_rows("The job", needs if detailed() else [one for one in needs if one[0] == ON_SCREEN])
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row, simulations, ranks):
         out.print(line, markup=False, soft_wrap=True)
     place = "results/samples.nc" if command == "sample" else "results"
-    out.print(f"srun hpcclear {command} {file} -o {place}{overrides}", markup=False, soft_wrap=True)
+    line = f"srun hpcclear {command} {file} -o {place}"
+    between = " \\\n    " if len(line + overrides) > WIDTH else ""
+    out.print(f"{line}{between}{overrides}", markup=False, soft_wrap=True)
 
 
 def _needs(

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.options import WIDTH, detailed
+from hpcclear.cli.options import detailed
 from hpcclear.cli.tables import console, table
 from hpcclear.cli.terminal import fitting
+from hpcclear.ranks.terminal import WIDTH
 from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.plain import plain
-from hpcclear.cli.options import WIDTH
+from hpcclear.ranks.terminal import WIDTH, clear
 
 
 class _PlainConsole(Console):
@@ -22,6 +22,7 @@ class _PlainConsole(Console):
 
 def console() -> Console:
     """Standard output; at most 80 columns, colours only on a terminal."""
+    clear()
     screen = Console(highlight=False, soft_wrap=False)
     width = min(WIDTH, screen.width) if screen.is_terminal else WIDTH
     return _PlainConsole(highlight=False, width=width)

@@ -6,7 +6,8 @@ import textwrap
 import click
 
 from hpcclear.base.plain import plain
-from hpcclear.cli.options import WIDTH, detailed, show
+from hpcclear.cli.options import detailed, show
+from hpcclear.ranks.terminal import WIDTH
 
 
 def print_remark(label: str, text: str) -> None:

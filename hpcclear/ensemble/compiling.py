@@ -4,7 +4,6 @@ Compilation takes longer than many a study's simulations. What one rank has comp
 its node load from disk.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,8 +14,8 @@ from hpcclear.dynamics.evaluation.evaluator import Evaluator
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.simulate import Payload, payload_of
 from hpcclear.ensemble.single import SHORTEST
-from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style, announce
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.inputs import RandomVariable
@@ -66,10 +65,5 @@ def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> N
 
     Of the points, perhaps none, the columns are what counts; `style`: how progress is shown.
     """
-    if style != "quiet":
-        print(
-            "compiling what this study needs: up to a minute the first time",
-            file=sys.stderr,
-            flush=True,
-        )
+    announce("compiling what this study needs: up to a minute the first time", style)
     ranks.everywhere("compile", compile_share, payload_of(scene, points))

@@ -4,7 +4,6 @@ Root follows the effect screening (`hpcclear.ensemble.certificate`); what it req
 points for every variant, simulated on all ranks and kept in the checkpoint."""
 
 import json
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,6 +21,7 @@ from hpcclear.ensemble.session import Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import Payload
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import announce
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
@@ -76,8 +76,7 @@ def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
     units = dict(zip(points.names, points.units, strict=True))
     checkpoint = session.opened(points.names, units)
     first = 0
-    if session.options.style != "quiet":
-        print(f"compiling {len(trial.switches) + 1} variants", file=sys.stderr, flush=True)
+    announce(f"compiling {len(trial.switches) + 1} variants", session.options.style)
     session.ranks.everywhere("compile", compile_share, trial.payloads())
 
     def simulate(variant: Scene, design: Points) -> Records:

@@ -13,8 +13,8 @@ from hpcclear.ensemble.maps import grid, number_of, run_map
 from hpcclear.ensemble.session import Finished, Options
 from hpcclear.ensemble.wear import run_wear
 from hpcclear.ranks.boundary import alone
-from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ from hpcclear.base.errors import InputError, refused
 from hpcclear.base.lock import Lock
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
-from hpcclear.ranks.progress import Style
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style, clear
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import (
     INTERVAL,
@@ -232,6 +232,7 @@ class Session:
         return self
 
     def __exit__(self, *error: object) -> None:
+        clear()
         self._lock.release()
 
     def found(self, kind: str) -> Results | None:

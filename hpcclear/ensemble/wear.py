@@ -22,8 +22,9 @@ from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
 from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ranks.progress import LivesProgress, Style
+from hpcclear.ranks.progress import LivesProgress
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene

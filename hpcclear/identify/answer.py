@@ -82,9 +82,9 @@ def _identified(
         for path in settings.signals
     ]
     layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
-    quiet = session.options.style == "quiet"
+    style = session.options.style
     ensemble = ensemble_of(
-        plain, inputs, every, settings.size(), seed, session.ranks, session.opened(), quiet
+        plain, inputs, every, settings.size(), seed, session.ranks, session.opened(), style
     )
     with session.ranks.stage("posterior"):
         found = [

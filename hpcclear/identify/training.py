@@ -1,6 +1,5 @@
 """The ensemble over the prior: machines as they may be, each simulated once, with the spectra of all signals."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,6 +18,7 @@ from hpcclear.identify.signals import (
     spectra,
 )
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style, announce
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -68,7 +68,7 @@ def prepared_scene(scene: Scene) -> Scene:
 
 def ensemble_of(
     scene: Scene, inputs: Inputs, names: Sequence[str], members: int, seed: int, ranks: Ranks,
-    checkpoint: Checkpoint | None = None, quiet: bool = True,
+    checkpoint: Checkpoint | None = None, style: Style = "quiet",
 ) -> Ensemble:  # fmt: skip
     """Simulate so many members of an ensemble, a power of two, on all ranks; on root. The checkpoint keeps finished ones.
 
@@ -85,9 +85,7 @@ def ensemble_of(
             together=TOGETHER, checkpoint=checkpoint, kept=f"members-{first:06d}",
         )  # fmt: skip
         parts.append(found[:, 0])
-        if not quiet:
-            done = first + len(parts[-1])
-            print(f"ensemble: {done} of {members} members", file=sys.stderr, flush=True)
+        announce(f"ensemble: {first + len(parts[-1])} of {members} members", style)
     whole = np.concatenate(parts)
     good = np.isfinite(whole[:, :, 0]).all(axis=(1, 2))
     if good.mean() < 1.0 - LARGEST_FAILURE:

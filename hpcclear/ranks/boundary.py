@@ -25,7 +25,6 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.extras import installing
-from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.stopping import (
@@ -38,6 +37,7 @@ from hpcclear.ranks.stopping import (
     StopSwitch,
 )
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import write
 from hpcclear.ranks.watch import SILENCE, Watch, silence
 
 PATIENCE = 600.0
@@ -370,5 +370,4 @@ def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
 
 def _say(text: str) -> None:
     with contextlib.suppress(OSError):  # a launcher that is gone reads no more
-        sys.stderr.write(plain(text) + "\n")
-        sys.stderr.flush()
+        write(text)

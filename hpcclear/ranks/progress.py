@@ -1,19 +1,16 @@
-"""How far a stage is: a bar on a terminal, a line now and then in a log, or nothing."""
+"""How far a stage is: a line on a terminal that the next replaces, a line now and then in a log, or nothing."""
 
 import os
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Self, TextIO
+from typing import Self, TextIO
 
 import numpy as np
 
-from hpcclear.ranks.launcher import is_launched
+from hpcclear.ranks.terminal import Style, clear, draw, terminal
 
-Style = Literal["auto", "bar", "log", "quiet"]
-
-_LAUNCHERS = ("mpiexec", "mpirun", "prterun", "orterun")
 _BAR_INTERVAL = 0.2  # s
 SIGN_OF_LIFE = 300.0  # s, after which a line of a log is repeated though nothing was finished
 _WINDOW = 30.0  # s, over which the rate is taken: costs change over a design
@@ -39,7 +36,6 @@ class Progress:
         self._interval = log_interval() if interval is None else interval
         self._stream = stream
         self._clock = clock
-        self._bar: Any = None
 
     def start(self, total: int, completed: np.ndarray) -> None:
         """Begin with `total` samples, of which the records `completed` are there already."""
@@ -48,14 +44,10 @@ class Progress:
         self._counted = (-1, -1)  # samples and failures of the last line of a log
         self._origin = (self._began, self._done)
         self._history = deque([self._origin])
+        found = terminal() if self._stream is None and self._style in ("auto", "bar") else None
         if self._style == "auto":
-            terminal = None if self._stream else launching_terminal()
-            self._stream = terminal or self._stream or sys.stderr
-            self._style = "bar" if self._stream.isatty() else "log"
-        self._stream = self._stream or sys.stderr
-        if self._style == "bar":
-            self._bar = _make_bar(self._label, total, self._stream)
-            self._bar.start()
+            self._style = "bar" if found else "log"
+        self._stream = found or self._stream or sys.stderr
 
     def add(self, records: np.ndarray) -> None:
         """Count finished records; a field ``status`` other than 0 is a failure."""
@@ -66,7 +58,7 @@ class Progress:
         """Show the state, if it is time to."""
         now = self._clock()
         if self._style == "quiet" or now - self._shown < (
-            self._interval if self._bar is None else _BAR_INTERVAL
+            _BAR_INTERVAL if self._style == "bar" else self._interval
         ):
             return
         self._shown = now
@@ -74,29 +66,30 @@ class Progress:
         while len(self._history) > 2 and now - self._history[1][0] >= _WINDOW:
             self._history.popleft()
         counted = (self._done, self._failed)
-        if self._bar is not None:
-            self._draw()
+        if self._style == "bar":
+            assert self._stream is not None
+            share = self._share()
+            draw(self._stream, f"{self._label}: {self.text()}, {self._eta()}", share)
         elif counted != self._counted or now - self._written >= SIGN_OF_LIFE:
             self._counted, self._written = counted, now
             self._write(f"{self.text()}, {self._eta()}")
 
     def close(self) -> None:
-        """Show the final state, with the rate over all."""
+        """Write the final state into a log, with the rate over all; what a terminal shows of it goes."""
         self._history = deque([self._origin])
-        if self._bar is not None:
-            self._draw()
-            self._bar.stop()
-            self._bar = None
-        if self._style != "quiet":
+        if self._style == "bar":
+            clear()
+        elif self._style != "quiet":
             self._write(f"{self.text()} in {duration(self._clock() - self._began)}")
 
     def text(self) -> str:
         """Done, total, percentage, failures and rate."""
-        share = 100.0 * self._done / self._total if self._total else 100.0
         failed = f", {self._failed} failed" if self._failed else ""
-        return (
-            f"{self._done}/{self._total} ({share:.0f} %){failed}, {grouped(self._rate())} samples/s"
-        )
+        counted = f"{self._done}/{self._total} ({100.0 * self._share():.0f} %){failed}"
+        return f"{counted}, {grouped(self._rate())} samples/s"
+
+    def _share(self) -> float:
+        return self._done / self._total if self._total else 1.0
 
     def _rate(self) -> float:
         """Samples a second over the last `_WINDOW` seconds."""
@@ -115,10 +108,6 @@ class Progress:
         assert self._stream is not None
         self._stream.write(f"{self._label}: {text}\n" if self._label else f"{text}\n")
         self._stream.flush()
-
-    def _draw(self) -> None:
-        self._bar.update(0, completed=self._done, state=f"{self.text()}, {self._eta()}")
-        self._bar.refresh()
 
 
 class LongProgress(Progress):
@@ -168,11 +157,8 @@ class LivesProgress(LongProgress):
         left = gone * (1.0 - self._behind) / self._behind if self._behind > 0.0 else 0.0
         return f"about {duration(left)} left" if left > 0.0 else "time left not known"
 
-    def _draw(self) -> None:
-        self._bar.update(
-            0, completed=self._behind * self._whole, state=f"{self.text()}, {self._eta()}"
-        )
-        self._bar.refresh()
+    def _share(self) -> float:
+        return self._behind
 
 
 def log_interval(environment: Mapping[str, str] = os.environ) -> float:
@@ -194,53 +180,6 @@ def grouped(number: float) -> str:
     return f"{number:,.0f}".replace(",", " ") if number >= 100.0 else f"{number:.3g}"
 
 
-def launching_terminal() -> TextIO | None:
-    """The terminal on which a local mpiexec shows what its ranks write; None if there is none.
-
-    Ranks write to a pipe even when a person watches, so look up the standard error of mpiexec
-    (Linux only).
-    """
-    if sys.platform != "linux" or not is_launched():
-        return None
-    pid = os.getppid()
-    try:
-        for _ in range(3):  # proxy, mpiexec
-            with open(f"/proc/{pid}/stat", encoding="utf-8") as status:
-                name, _, rest = status.read().partition("(")[2].rpartition(")")
-            if name.startswith(_LAUNCHERS):
-                return _open_terminal(os.readlink(f"/proc/{pid}/fd/2"))
-            pid = int(rest.split()[1])
-    except OSError:  # another user's process, or another namespace
-        return None
-    return None
-
-
-def _open_terminal(path: str) -> TextIO | None:
-    if not path.startswith("/dev/"):
-        return None
-    descriptor = os.open(path, os.O_WRONLY | os.O_NOCTTY)
-    if os.isatty(descriptor):
-        return os.fdopen(descriptor, "w")
-    os.close(descriptor)
-    return None
-
-
 def _failures(records: np.ndarray) -> int:
     names = records.dtype.names or ()
     return int(np.count_nonzero(records["status"])) if "status" in names else 0
-
-
-def _make_bar(label: str, total: int, stream: TextIO) -> Any:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[state]}"),
-        console=Console(file=stream),
-        auto_refresh=False,  # no thread: drawn between two quanta of work
-        transient=True,  # the last line is written as text
-    )
-    bar.add_task(label, total=total, state="")
-    return bar

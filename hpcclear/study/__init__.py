@@ -30,8 +30,8 @@ from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import Options, Place, Session
 from hpcclear.ranks.boundary import alone
-from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.describing import unused
@@ -123,7 +123,7 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     columns = tuple(variable.paths for variable in study.variables)
     points = expanded(study, Points(study.names, np.empty((0, len(columns))), columns))
     compile_ahead(scene, session.ranks, points, style)
-    announce = Announcer(scene).announced if style != "quiet" else Announcer.silent
+    announce = Announcer(scene, style).announced
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
     run = StudyRun(

@@ -8,8 +8,9 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.samples import sample_points
-from hpcclear.ranks.progress import Progress, Style
+from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical

@@ -4,14 +4,13 @@ Resuming, announcements, plans and the files of a finished study all go by this 
 """
 
 import itertools
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import duration
+from hpcclear.ranks.terminal import Style, announce
 from hpcclear.scene import Scene
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
@@ -124,15 +123,10 @@ def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verifi
     true = run.stage("verification", _moments, found.designs)
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
-    remarks = list(found.remarks)
     text, more = tolerance.reached(run, true, table)
-    if run.study.paired:
-        run.notify(text)
-    remarks += more
+    remarks = [*found.remarks, *([text] if run.study.paired else []), *more]
     remarks += verification.undecided(run, table.choices, true)
     remarks += verification.missed(run, table.choices, true, models.searched)
-    for text in remarks:
-        run.notify(text)
     return Verified(found.designs, table, true, remarks)
 
 
@@ -313,9 +307,10 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
 
 
 class Announcer:
-    """Reports each stage of a study of this scene as it begins, on standard error."""
+    """Reports each stage of a study of this scene as it begins, on standard error, in a style of progress."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, style: Style) -> None:
+        self._style = style
         self._counted = [stage.words for stage in stages_of(scene) if stage.words]
         self._began = time.monotonic()
 
@@ -326,8 +321,4 @@ class Announcer:
             if kind in words:
                 spent = duration(time.monotonic() - self._began)
                 text = f"stage {number} of {len(self._counted)}: {words[kind]} ({spent} so far)"
-                print(plain(text), file=sys.stderr, flush=True)
-
-    @staticmethod
-    def silent(name: str) -> None:
-        """Say nothing."""
+                announce(text, self._style)

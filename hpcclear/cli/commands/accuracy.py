@@ -70,10 +70,11 @@ def _measure(
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.printing import describe
         from hpcclear.ensemble.session import Options
+        from hpcclear.ranks.terminal import announce
         from hpcclear.report.html.content import Content
 
         def notify(text: str) -> None:
-            cli.say(f"accuracy: {text}")
+            announce(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
         place = cli.place_of(output)
@@ -84,12 +85,14 @@ def _measure(
 def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:
     with cli.on_ranks(resumes=False) as ranks:
         scene = cli.read_scene(written)
-        from hpcclear.accuracy.plan import ladder, measure
+        from hpcclear.accuracy.plan import Plan, ladder, measure
         from hpcclear.cli.plan import describe, preview
+        from hpcclear.ranks.terminal import announce
 
         planned = ranks.size if workers is None else workers
-        made = measure(
-            scene, ranks, ladder(scene, error), planned, cli.say,
-            lambda plan: cli.say(preview(plan, planned)), "auto",
-        )  # fmt: skip
+
+        def show(plan: Plan) -> None:
+            (cli.say if plan.first else announce)(preview(plan, planned))
+
+        made = measure(scene, ranks, ladder(scene, error), planned, announce, show, "auto")
         describe(made, str(written.file), error, planned)
