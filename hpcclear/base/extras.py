@@ -1,7 +1,6 @@
 """How to install what a part of the package needs and not everyone has."""
 
 import re
-from importlib import metadata
 
 
 def installing(extra: str) -> str:
@@ -9,6 +8,8 @@ def installing(extra: str) -> str:
 
     It names the packages, so that it is true wherever this package came from: an index, a wheel or a clone.
     """
+    from importlib import metadata  # takes a tenth of the time in which a scene is checked
+
     wanted = []
     try:
         for requirement in metadata.requires("hpcclear") or ():

@@ -10,6 +10,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed, place_of, show
 from hpcclear.cli.terminal import print_remark, show_rows
+from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.scene.plugged import files_run
@@ -65,7 +66,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
             ("effects", _few(effects)),
             ("method", f"{method}; {turns} revolutions"),
             *_speeds(scene)[:2],
-            ("MPI", _mpi(ranks)),
+            *([("MPI", _mpi(ranks))] if cost or is_launched() else []),
         ]
     show_rows("Model", rows)
     for text in (*files_run(scene.plugins), *scene.readings):
