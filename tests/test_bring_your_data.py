@@ -6,9 +6,12 @@ from pathlib import Path
 import kinds_of_tables
 import numpy as np
 import pytest
+import report_data as data
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import periodic
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.origin import inputs
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.points import read_points
@@ -175,20 +178,24 @@ def test_a_result_carries_what_files_held(tmp_path):
     (tmp_path / "scene.toml").write_text(text)
     scene = load_scene(tmp_path / "scene.toml")
     assert scene.required_study.random_input("C").values == (3.1e-4, 3.6e-4, 4.4e-4)
-    assert [one.split(":")[0] for one in scene.readings] == [
-        "effects.slider_load",
-        "study.random.C",
-    ]
-    assert (
-        "'p.csv' is read as UTF-8, commas, decimal points, 72 rows, pressure from 1 to 8 bar, SHA-256"
-        in scene.readings[0]
-    )
+    (load, file, read), (clearance, *_) = scene.readings
+    assert (load, file, clearance) == ("effects.slider_load", "p.csv", "study.random.C")
+    shown = "UTF-8, commas, decimal points, 72 rows, pressure from 1 to 8 bar, SHA-256"
+    assert read.startswith(shown)
     before = scene.text
     path.unlink()
     assert scene_of_text(before, "result.nc") == scene
     assert "# effects.slider_load: 'p.csv' is read as" in before
     changed = scene.with_({"drive.speed": "900 rpm"})
     assert scene_of_text(changed.text, "result.nc") == changed
+    result = data.response().assign_attrs(changed.origin)
+    (table,) = inputs(Content(tmp_path, {}, {}, {"response": result}))
+    drawn = {name: value for _, name, value in table.rows}["p.csv"]
+    x, y = np.array([point.split(",") for point in drawn["points"].split()], float).T
+    np.testing.assert_allclose(
+        y / 24.0, (kinds_of_tables.compressed(3.6 * x) - 1.0) / 7.0, atol=0.01
+    )
+    assert drawn["words"] == "-219.9 N to 0 N"  # of 7 bar on a bore of 20 mm
 
 
 @pytest.mark.parametrize(

@@ -204,7 +204,7 @@ def test_a_joint_by_its_fit():
     scene = scene_with({"joints.crank_rod.fit": "20 H7/f7"})
     joint = scene.joints.crank_rod
     assert joint.clearance == 20.5e-6
-    assert scene.readings == (
+    assert tuple(map(str, scene.readings)) == (
         "joints.crank_rod.fit: '20 H7/f7' is read as a radial clearance of 10 to 31 um, here 20.5 um, and a bearing radius of "
         "10.00525 mm",
     )

@@ -178,7 +178,7 @@ def test_a_width_in_percent_of_a_number_the_study_does_not_vary_is_of_the_scene(
     }
     scene = SLIDER_CRANK.with_({"study": table})
     assert scene.study.random_input("mu").half_width == pytest.approx(0.1 * 0.01)
-    assert any("10 % of 0.01" in one for one in scene.readings)
+    assert any("10 % of 0.01" in one.read for one in scene.readings)
 
 
 # ---- units by kind ----------------------------------------------------------------------------------

@@ -5,11 +5,26 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isfinite
+from typing import NamedTuple
 
+from hpcclear.base.plain import plain
 from hpcclear.base.units import TEXTS, factor, is_written_in, spelled
 
 Texts = dict[tuple[float, str], str]
 """What was written for numbers, by their values and units in SI."""
+
+
+class Reading(NamedTuple):
+    """How an entry of a scene was read: its path, what was written there, and what that means; as a text a sentence."""
+
+    entry: str
+    written: str
+    read: str
+
+    def __str__(self) -> str:
+        text = f"{self.entry}: {self.written!r} is read as {self.read}"
+        return plain(" ".join(text.split()))
+
 
 _SCALED = re.compile(r"[num\u00b5\u03bckMG]?(?:m|N|J|W|Pa|s|Hz)|k?g|rad")
 """Units that are shown in a size that is read well, whichever of them was written."""

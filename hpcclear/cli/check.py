@@ -69,7 +69,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
             *([("MPI", _mpi(ranks))] if cost or is_launched() else []),
         ]
     show_rows("Model", rows)
-    for text in (*files_run(scene.plugins), *scene.readings):
+    for text in (*files_run(scene.plugins), *map(str, scene.readings)):
         print_remark("Note", text)
     warned = [*locked, *cautions_of(scene), *scene.warnings]
     most = len(warned) if detailed() else MOST_WARNINGS

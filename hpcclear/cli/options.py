@@ -126,7 +126,7 @@ def read_scene(written: Written) -> "Scene":
     from hpcclear.scene.plugged import files_run
 
     scene = load_scene(*written)
-    for text in (*files_run(scene.plugins), *scene.readings):
+    for text in (*files_run(scene.plugins), *map(str, scene.readings)):
         say(f"Note: {text}")
     for text in implausible(scene):
         say(f"Warning: {text}")

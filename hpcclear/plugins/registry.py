@@ -139,11 +139,12 @@ class Registry(Generic[Plugin]):
         note_package(found.package, found.version)
         return found.value
 
-    def _points(self, **wanted: str) -> "EntryPoints":
+    def _points(self, name: str | None = None) -> "EntryPoints":
         """What installed packages offer of this kind; looking for it takes a tenth of the time of `check`."""
         from importlib.metadata import entry_points
 
-        return entry_points(group=self.group, **wanted)
+        found = entry_points(group=self.group)
+        return found if name is None else found.select(name=name)
 
     def _loaded(self, point: "EntryPoint") -> _Offered:
         package, version = _package(point)

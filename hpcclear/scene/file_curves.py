@@ -11,8 +11,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
-from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
+from hpcclear.base.written import Reading
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, Content, PositiveLength, Quantity, Table, invalid
 from hpcclear.scene.paths import curves, files_named, replace
@@ -252,12 +252,12 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
 
 def with_values(
     content: Mapping[str, object], folder: Path
-) -> tuple[Mapping[str, object], list[str]]:
-    """The parsed content of a scene with what files in `folder` hold in the place of their names, and a sentence for each.
+) -> tuple[Mapping[str, object], list[Reading]]:
+    """The parsed content of a scene with what files in `folder` hold in the place of their names, and how each was read.
 
     Raises InputError if a file cannot be read, has no such column or a cell in it is no number.
     """
-    read_as = []
+    read_as: list[Reading] = []
     for key, row in files_named(content).items():
         file = row["file"]
         if not isinstance(file, str) or not file:
@@ -271,8 +271,7 @@ def with_values(
             made, shown = _curve(content, row, key, folder)
         content = replace(content, key, made)
         digest = hashlib.sha256(place_of(folder / file)[0].read_bytes()).hexdigest()
-        text = f"{key}: {file!r} is read as {shown}, SHA-256 {digest[:16]}"
-        read_as.append(plain(" ".join(text.split())))
+        read_as.append(Reading(key, file, f"{shown}, SHA-256 {digest[:16]}"))
     return content, read_as
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import tomli_w
 
 from hpcclear.base.errors import InputError, content_of
+from hpcclear.base.written import Reading
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import files_named
 from hpcclear.scene.plugged import check_trust, with_texts
@@ -61,7 +62,7 @@ def load_scene(
     for override in overrides:
         content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
-    named, read_as = files_named(content), list[str]()
+    named, read_as = files_named(content), list[Reading]()
     if named:
         from hpcclear.scene.file_curves import with_values  # with the readers of all kinds of files
 

@@ -1,6 +1,7 @@
 """The scene: one validated, frozen description of what is simulated."""
 
 import contextlib
+import json
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,7 +12,7 @@ from hpcclear.base import markup
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.base.outcome import record_type
 from hpcclear.base.units import is_written_in, to_si
-from hpcclear.base.written import Texts, reading, shown, text_of, unit_for
+from hpcclear.base.written import Reading, Texts, reading, shown, text_of, unit_for
 from hpcclear.scene import describing
 from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fields import Content
@@ -37,8 +38,8 @@ class Scene(ConsistentTables):
         return tuple(describing.warnings(self))
 
     @property
-    def readings(self) -> tuple[str, ...]:
-        """Texts whose unit left open what is meant, and how each was read, a sentence each."""
+    def readings(self) -> tuple[Reading, ...]:
+        """Fits, files, and texts whose unit left open what is meant, and as what each was read."""
         return self._readings
 
     @property
@@ -52,7 +53,14 @@ class Scene(ConsistentTables):
         words = {} if self.about is None else self.about.model_dump(exclude_none=True)
         about = {f"about_{name}": str(text) for name, text in words.items()}
         cited = {"references": self.references} if self.references else {}
-        return {**cited, "scene": self.text or self.to_toml(), "scene_hash": self.hash, **about}
+        read = {"readings": json.dumps(self._readings)} if self._readings else {}
+        return {
+            **cited,
+            **read,
+            "scene": self.text or self.to_toml(),
+            "scene_hash": self.hash,
+            **about,
+        }
 
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""
@@ -142,6 +150,12 @@ class Scene(ConsistentTables):
         result = scene_of(Scene, content, self)
         notes = "".join(f"# changed: {path} = {value!r}\n" for path, value in altered.items())
         result._text = notes + self.text
+        known = {one.entry for one in result._readings}
+        tables = tuple(path.rpartition(".")[0] + "." for path in altered)
+        result._readings += tuple(  # that what stands beside a change does not alter; files are not opened again
+            one for one in self._readings
+            if one.entry not in known and not f"{one.entry}.".startswith(tables)
+        )  # fmt: skip
         return result
 
     def __eq__(self, other: object) -> bool:
@@ -151,7 +165,7 @@ class Scene(ConsistentTables):
         return hash(self.hash)
 
 
-def _unpickled(content: Content, text: str, readings: tuple[str, ...], texts: Texts) -> Scene:
+def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts: Texts) -> Scene:
     """A scene from what `Scene.__reduce__` gives."""
     scene = scene_of(Scene, content)
     scene._text, scene._readings, scene._texts = text, readings, texts

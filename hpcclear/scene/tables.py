@@ -11,7 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.base.outcome import IMPACTS, LEVELS, RESPONSES
 from hpcclear.base.units import is_written_in
-from hpcclear.base.written import Texts, reading, shown, text_of
+from hpcclear.base.written import Reading, Texts, reading, shown, text_of
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.about import About, inputs_of
@@ -56,7 +56,7 @@ class SceneTables(Table):
         for key in table.model_fields
     }
 
-    _readings: tuple[str, ...] = PrivateAttr(())
+    _readings: tuple[Reading, ...] = PrivateAttr(())
     _texts: Texts = PrivateAttr(default_factory=dict)
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
     _known_hash: str | None = PrivateAttr(None)

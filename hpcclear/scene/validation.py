@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import factor, is_written_in, noting
-from hpcclear.base.written import reading
+from hpcclear.base.written import Reading, reading
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import LARGEST, Content, Table, hint, invalid, nearest
@@ -105,8 +105,8 @@ def _numbers_in(content: object) -> Iterator[float]:
         yield content
 
 
-def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[str]:
-    """A sentence for each text that was read as `read` says, with the first entry that has it."""
+def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[Reading]:
+    """Each text that was read as `read` says, with the first entry that has it."""
     left = dict(read)
     for key, entry in flatten(content):
         level = [entry]
@@ -114,7 +114,7 @@ def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[
             level = [one for inner in level if isinstance(inner, list) for one in inner]
         for text in level:
             if isinstance(text, str) and text.strip() in left:
-                yield f"{key}: {text.strip()!r} is read as {left.pop(text.strip())}"
+                yield Reading(key, text.strip(), left.pop(text.strip()))
 
 
 def _check_study(scene: SceneTables, study: Study) -> None:

@@ -1,6 +1,6 @@
 """The sections of the page on where results come from: scene, time of the ranks, how to do it again."""
 
-import re
+import json
 
 import numpy as np
 
@@ -13,25 +13,20 @@ _PARTS = {"busy": "computing", "idle": "waiting", "compile": "compiling", "write
 """What a rank spends time on, variables of kind ``timing``, in words."""
 
 
-_READ = re.compile(r"(?:# )?(\S+): '(.+?)' is read as (.+)")
-"""A note on how an entry of a scene was read: its path, what was written, and what that means."""
-
-
 def inputs(content: Content) -> list[object] | None:
     """Fits, files and curves of the scene by their names, curves with a small drawing."""
     text = content.attribute("scene")
     if (scene := scene_in(text)) is None:
         return None
-    notes = map(_READ.fullmatch, (*scene.readings, *text.splitlines()))
-    read = {one[1]: one for one in notes if one is not None}
+    read = {one[0]: one[1:] for one in json.loads(content.attribute("readings") or "[]")}
     rows: list[list[object]] = []
     for one in curves.tabulated(scene):
-        name = read.pop(one.key)[2] if one.key in read else f"{len(one.rows)} points"
-        values = [value for _, value in one.rows]
+        name = read.pop(one.key)[0] if one.key in read else f"{len(one.rows)} points"
+        values = [value + 0.0 for _, value in one.rows]  # without a sign of zero
         words = labels.between(min(values), max(values), one.unit)
         drawn = {"kind": "curve", "words": words, "points": curves.outline(one)}
         rows.append([labels.entry(one.key), name, drawn])
-    rows += [[labels.entry(path), one[2], one[3]] for path, one in read.items()]
+    rows += [[labels.entry(path), *one] for path, one in read.items()]
     return (
         [PageTable(["entry", "as written", "value"], rows, "Fits, files and curves")]
         if rows
