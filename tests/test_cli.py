@@ -13,6 +13,7 @@ import xarray as xr
 from click.testing import CliRunner
 from commands import MPIEXEC, warm
 from patience import crowded
+from test_progress import left_of, run_on_a_terminal
 
 from hpcclear import __version__
 from hpcclear.cli import OLD, cli
@@ -58,13 +59,13 @@ def test_check_says_what_would_be_simulated():
     "words",
     [
         ("sample", "--set", "study.samples=40"),
-        ("map", "--x", "C=0.1mm:1mm:4"),
+        ("map", "--x", "m3=0.1:0.2:4"),
         ("wear", "--set", "wear.lives=2", "--set", "wear.cycles=1e4"),
     ],
     ids=lambda words: words[0],
 )
 @pytest.mark.shortened(3)
-def test_what_a_pipe_gets_fits_80_columns_on_any_number_of_ranks(tmp_path, words, ranks):
+def test_pipes_and_terminals_get_80_columns_on_any_number_of_ranks(tmp_path, words, ranks):
     """Output and log: no colour, no bar, no line that wraps, nothing said once a rank."""
     scene = {"wear": "wear"}.get(words[0], "quickstart")
     command, *options = words
@@ -77,6 +78,12 @@ def test_what_a_pipe_gets_fits_80_columns_on_any_number_of_ranks(tmp_path, words
         lines = [line.strip() for line in told.splitlines() if line.strip()]
         assert all(len(line) <= 80 for line in told.splitlines()), told
         assert len(lines) == len(set(lines)), told
+    asked = [one.replace("x.nc", "y.nc").replace("quickstart", "tolerances") for one in asked]
+    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    program = [*launch, sys.executable, "-m", "hpcclear", *asked]
+    lines = left_of(run_on_a_terminal(program, cwd=tmp_path))  # with notes
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
 
 
 def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):

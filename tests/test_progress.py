@@ -17,7 +17,6 @@ from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.progress import Progress
 
 ROOT = pathlib.Path(__file__).parents[1]
-SHORT = ["--set", "numerics.transient_revolutions=1", "--set", "numerics.averaged_revolutions=2"]
 PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 
@@ -101,33 +100,6 @@ def test_a_person_at_a_terminal_sees_a_bar_also_through_mpiexec(launch):
     seen = run_on_a_terminal([*launch, sys.executable, str(PROGRAM)])
     assert re.search(r"sampling: \d+/150 \(\d+ %\), \d+ failed.*━", seen)
     assert left_of(seen) == [""]
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("scene", ["quickstart", "linkages/v_twin", "tolerances", "wear"])
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["simulate", "-o", "one.nc"],
-        ["sample", "-o", "some.nc", "--set", "study.samples=16"],
-        ["check"],
-    ],
-    ids=lambda words: words[0],
-)
-@pytest.mark.shortened(2)
-def test_a_terminal_shows_at_most_24_lines_of_80_columns_and_no_note_twice(words, scene, tmp_path):
-    """Notes and progress count."""
-    command, *options = words
-    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
-    asked = [command, f"jobs/{scene}.toml", *options, *SHORT]
-    launch = [str(MPIEXEC), "-n", "2"] if command == "sample" else []
-    lines = left_of(
-        run_on_a_terminal([*launch, sys.executable, "-m", "hpcclear", *asked], cwd=tmp_path)
-    )
-    assert len(lines) <= 24
-    assert max(map(len, lines)) <= 80
-    notes = [line for line in lines if line.startswith(("Note", "Warning"))]
-    assert len(notes) == len(set(notes))
 
 
 @pytest.mark.mpi
