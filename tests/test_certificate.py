@@ -526,7 +526,8 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
     told: list[str] = []
 
     def once():
-        checkpoint = Checkpoint(tmp_path / "checkpoint", {"a": "b"}, names=scene.study.names)
+        units = {variable.name: variable.unit for variable in scene.study.variables}
+        checkpoint = Checkpoint(tmp_path / "checkpoint", {"a": "b"}, units=units)
         ranks = alone()
         simulations = Simulations(scene, ranks, checkpoint, "quiet")
         run = StudyRun(scene, tmp_path, ranks, checkpoint, simulations, told.append)

@@ -59,7 +59,7 @@ def test_parts_too_large_to_be_kept_are_read_from_their_files(tmp_path, monkeypa
     found = []
     for kept in (50_000, 4):
         monkeypatch.setattr("hpcclear.results.checkpoint._KEPT", kept)
-        checkpoint = Checkpoint(tmp_path / str(kept), KEY, names=("m2", "C"))
+        checkpoint = Checkpoint(tmp_path / str(kept), KEY, units={"m2": "kg", "C": "m"})
         for first in range(0, 55, 5):
             records = outcomes(first, 5)
             checkpoint.add(records, np.stack([records["sample"], 0.5 * records["sample"]], 1))

@@ -31,8 +31,8 @@ def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     )
 
     columns = [
-        SampledVariable(name, unit or "1", values)
-        for name, unit, values in zip(points.names, points.units, points.values.T, strict=True)
+        SampledVariable(name, unit or "1", points.column(name))
+        for name, unit in points.units.items()
     ]
     for reason in dict.fromkeys(found.refused.values()):
         hit = np.array([found.refused.get(row) == reason for row in range(total)])

@@ -117,7 +117,7 @@ def run_bifurcation(
             content = session.write(
                 dataset.dataset(
                     "bifurcation", coords, {points.names[0]: points.values[:, 0], "observed": observed},
-                    session.attributes, dict(zip(points.names, points.units, strict=True)), what,
+                    session.attributes, points.units, what,
                     points.words,
                 )
             )  # fmt: skip

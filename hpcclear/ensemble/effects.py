@@ -73,8 +73,7 @@ def run_effects(
 
 def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
     points = trial.drawn.points(0, 1)
-    units = dict(zip(points.names, points.units, strict=True))
-    checkpoint = session.opened(points.names, units)
+    checkpoint = session.opened(points.units)
     first = 0
     announce(f"compiling {len(trial.switches) + 1} variants", session.options.style)
     session.ranks.everywhere("compile", compile_share, trial.payloads())

@@ -104,8 +104,7 @@ def lives_dataset(
         "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
         "random_input": np.array(names, dtype=str),
     } | ({} if even is None else {"angle": angles})  # fmt: skip
-    units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
-    words = None if inputs is None else inputs.words
+    units, words = ({}, None) if inputs is None else (inputs.units, inputs.words)
     bounds = {f"limit_{name}": value for name, value in limits.items()}
     attrs = {**attributes, "tolerance": scene.wear.tolerance, **bounds}
     return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)

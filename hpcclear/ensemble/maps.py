@@ -128,8 +128,7 @@ def run_map(
         content = session.found("samples")
         if content is None:
             session.describe(scene, mapped=True)
-            units = dict(zip(points.names, points.units, strict=True))
-            checkpoint = session.opened(points.names, units)
+            checkpoint = session.opened(points.units)
             progress = Progress("cells", options.style)
             records = sample_points(
                 scene,

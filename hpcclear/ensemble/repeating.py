@@ -1,7 +1,7 @@
 """The `reproduce` command: whether what result files hold is what their scenes come to here, bit by bit."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
@@ -92,10 +93,8 @@ def _samples(content: Results, scene: Scene) -> Results:
         {str(one.attrs.get("scene_path", name)): one.to_numpy() for name, one in rows.items()},
     )
     records = evaluate_records(scene, points)
-    units = dict(zip(rows, points.units, strict=True))
-    return dataset.samples_dataset(
-        tuple(rows), points.values, units, records, {}, scene.objective, joints=scene.joint_labels
-    )
+    named = replace(points, names=tuple(rows))
+    return samples_of(named, records, {}, scene.objective, scene.joint_labels)
 
 
 def _series(content: Results, scene: Scene) -> tuple[Results, Results]:

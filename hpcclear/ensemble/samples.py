@@ -88,14 +88,13 @@ def run_sample(
 
 def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
     """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
-    units = dict(zip(points.names, points.units, strict=True))
     session.describe(scene)
     if len(points) * MEMORY >= NOTABLE:
         session.notify(
             f"root keeps all {len(points)} samples in memory, {len(points) * MEMORY:.1f} GB at the end; "
             "Monte Carlo samples it can write as they come: --statistics --raw DIR"
         )
-    checkpoint = session.opened(points.names, units)
+    checkpoint = session.opened(points.units)
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)
     records["sample"] += first
@@ -124,7 +123,7 @@ def samples_of(
     return dataset.samples_dataset(
         points.names,
         points.values,
-        dict(zip(points.names, points.units, strict=True)),
+        points.units,
         records,
         {**attributes, **drawn},
         objective,

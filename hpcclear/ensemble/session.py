@@ -260,16 +260,13 @@ class Session:
             **key_attribute(self.key),
         }
 
-    def opened(
-        self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
-    ) -> Checkpoint:
-        """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
+    def opened(self, units: Mapping[str, str] | None = None) -> Checkpoint:
+        """What an earlier run left unfinished; `units`: of its design variables, by their names."""
         with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts,
                 self.key,
                 interval=self.options.interval,
-                names=names,
                 units=units,
                 attributes=self.attributes,
                 joints=self.joints,

@@ -274,9 +274,7 @@ def run_wear(
         content = session.found("wear")
         if content is None:
             session.describe(scene)
-            named = states.points(np.empty((0, len(states.names))))
-            units = dict(zip(named.names, named.units, strict=True))
-            checkpoint = session.opened(states.names, units)
+            checkpoint = session.opened(states.points(np.empty((0, len(states.names)))).units)
             style = options.style
             lives = follow(scene, joints, states, ranks, checkpoint, style=style)
             even = None

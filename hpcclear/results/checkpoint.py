@@ -74,8 +74,8 @@ class Checkpoint:
     """Finished samples and stages of one run, in a directory of their own; a part file every `interval` seconds.
 
     Opening it makes the directory (not its parent), removes rubbish that a kill left, and reads what is there. One process
-    uses it at a time: hold a `hpcclear.base.lock.Lock`. `key`: what makes the run what it is, see `check_key`; `names`:
-    design variables whose values `add` gets, by name or scene path, `units` of those that are not the paper's; `attributes`:
+    uses it at a time: hold a `hpcclear.base.lock.Lock`. `key`: what makes the run what it is, see `check_key`; `units`:
+    of the design variables whose values `add` gets, by name or scene path, in its order; `attributes`:
     of the part files; `joints`: labels of the joints of the records, whose type is `record`
     (`hpcclear.scene.scene.record_of`). `problems`: what was found on disk and could not be used, a sentence each.
 
@@ -89,7 +89,6 @@ class Checkpoint:
         key: Mapping[str, str],
         *,
         interval: float = INTERVAL,
-        names: Sequence[str] = (),
         units: Mapping[str, str] | None = None,
         attributes: Mapping[str, object] | None = None,
         joints: Sequence[str] = JOINTS,
@@ -99,7 +98,6 @@ class Checkpoint:
         self.directory = directory
         self.key = dict(key)
         self.interval = interval
-        self.names = tuple(names)
         self.units = dict(units or {})
         self.joints, self.record = tuple(joints), record
         self.attributes = {**(attributes or {}), **key_attribute(key)}
@@ -126,11 +124,11 @@ class Checkpoint:
         """Take finished samples into memory; the flushes write them.
 
         `records`, shape (n,), may be of a variant of the scene that requests less than the checkpoint keeps; `values`,
-        shape (n, k), are their designs, a column for each of `names`.
+        shape (n, k), are their designs, a column for each of `units`.
         """
         columns = np.empty((len(records), 0)) if values is None else np.asarray(values, float)
-        if columns.shape != (len(records), len(self.names)):
-            raise ValueError(f"designs have shape {columns.shape}, names are {self.names}")
+        if columns.shape != (len(records), len(self.units)):
+            raise ValueError(f"designs have shape {columns.shape}, names are {tuple(self.units)}")
         if len(records):
             self._buffer.append((recast(records, self.record).copy(), columns.copy()))
 
@@ -176,7 +174,7 @@ class Checkpoint:
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
         records, values = _join([records], [values])
         content = dataset.samples_dataset(
-            self.names, values, self.units, records, self.attributes, joints=self.joints
+            tuple(self.units), values, self.units, records, self.attributes, joints=self.joints
         )
         path = self.directory / f"part-{level:02d}-{self._number:06d}.nc"
         dataset.write(content, path)
@@ -200,7 +198,7 @@ class Checkpoint:
     def _designs(self, content: Results) -> np.ndarray:
         """Designs (n, k) of a part, a column for each name."""
         designs = designs_in(content)
-        columns = [designs[name] for name in self.names]
+        columns = [designs[name] for name in self.units]
         return np.stack(columns, 1) if columns else np.empty((content.sizes["sample"], 0))
 
     def _merge(self) -> None:
@@ -292,7 +290,7 @@ class Checkpoint:
             self.problems.append(f"samples of {path.name} are done again: {error.reason}")
             return
         check_key(content, self.key, path)
-        if set(designs_in(content)) != set(self.names):
+        if set(designs_in(content)) != set(self.units):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
         records = recast(dataset.records(content), self.record)

@@ -58,9 +58,10 @@ class Points:
         return len(self.values)
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """SI unit of each column, "" for none."""
-        return tuple(quantities()[paths[0]].unit if paths else "" for paths in self.paths)
+    def units(self) -> dict[str, str]:
+        """SI unit of each column, "" for none, by its name."""
+        named = zip(self.names, self.paths, strict=True)
+        return {name: quantities()[paths[0]].unit if paths else "" for name, paths in named}
 
     @property
     def words(self) -> dict[str, str]:

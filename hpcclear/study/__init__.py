@@ -119,7 +119,7 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     study, style = scene.required_study, session.options.style
     session.describe(scene)
     units = {variable.name: variable.unit for variable in study.variables}
-    checkpoint = session.opened(study.names, units)
+    checkpoint = session.opened(units)
     columns = tuple(variable.paths for variable in study.variables)
     points = expanded(study, Points(study.names, np.empty((0, len(columns))), columns))
     compile_ahead(scene, session.ranks, points, style)
