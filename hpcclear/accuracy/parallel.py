@@ -13,8 +13,7 @@ from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import to_physical
-from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import points_at
 from hpcclear.scene.scene import record_of
 from hpcclear.scene.streams import generator
 
@@ -64,8 +63,7 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     rng = generator(scene.required_study.seed, "accuracy", "parallel")
     unit = rng.random((samples, len(region.names)))
     coordinates = region.lower + unit * (region.upper - region.lower)
-    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
-    points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
+    points = points_at(scene, region.names, coordinates)
     stage = _stage(number, samples)
     payload = simulate.payload_of(scene, points)
     task = Task(stage, simulate.make_evaluator, payload, record_of(scene), workers=number)

@@ -10,9 +10,9 @@ from hpcclear.base.outcome import Status
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import Box, box, to_physical
+from hpcclear.scene.domain import Box, box
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import unit_lhs
+from hpcclear.scene.sampling import points_at, unit_lhs
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.metrics import accuracy
@@ -111,9 +111,7 @@ def simulated(
 
     With the core-seconds of one of them.
     """
-    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
-    points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
-    return objectives(scene, points, ranks, stage)
+    return objectives(scene, points_at(scene, region.names, coordinates), ranks, stage)
 
 
 def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:

@@ -174,7 +174,7 @@ def _response(
     if steady is None and not still:  # what the sample measures as well has its bits
         names += [name for name in impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
-        curves = curves_of(scene.linkage, scene.numerics.interpolation)
+        curves = curves_of(scene)
         angle, constant = data["crank_angle"], scene.effects.slider_load
         data["slider_load"] = curves["load"].at(angle) if curves else np.full(len(angle), constant)
     reported = {name: record[name][0] for name in names}

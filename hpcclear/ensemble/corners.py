@@ -8,8 +8,9 @@ from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import moves_geometry, poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.domain import box
 from hpcclear.scene.points import Points, check_points, expanded, snapped
+from hpcclear.scene.sampling import points_at
 from hpcclear.scene.streams import generator
 
 MOST = 64
@@ -44,11 +45,9 @@ def corners(scene: Scene) -> Points:
     half[:, -1] = False
     upper = np.concatenate([half, ~half])
     coordinates = np.where(upper, region.upper, region.lower)
-    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     study = scene.required_study
     coordinates = snapped(study, region.names, coordinates)
-    made = Points(region.names, to_physical(scene, region.names, coordinates), paths)
-    return expanded(study, made)
+    return expanded(study, points_at(scene, region.names, coordinates))
 
 
 def tried(scene: Scene, simulate: bool) -> CornerOutcomes:

@@ -55,13 +55,15 @@ def latin_hypercube(
     for column, name in enumerate(region.names):
         if (options := study.variable(name).options) is not None:
             coordinates[:, column] = _of_options(options, unit[:, column])
-    points = Points(
-        region.names,
-        to_physical(scene, region.names, coordinates),
-        tuple(study.variable(name).paths for name in region.names),
-    )
+    points = points_at(scene, region.names, coordinates)
     check_points(scene, points)
     return points
+
+
+def points_at(scene: Scene, names: tuple[str, ...], coordinates: Array) -> Points:
+    """Designs at sampling coordinates (n, d) of variables of the scene's study; they may make no mechanism."""
+    paths = tuple(scene.required_study.variable(name).paths for name in names)
+    return Points(names, to_physical(scene, names, coordinates), paths)
 
 
 def _chances(

@@ -73,8 +73,7 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
 
 def _curves(scene: Scene) -> dict[str, Callable[[Array], Array]]:
     """Tabulated loads by name, each as a function of the angle or time that it goes by."""
-    curves = curves_of(scene.linkage, scene.numerics.interpolation)
-    return {name: curve.at for name, curve in curves.items()}
+    return {name: curve.at for name, curve in curves_of(scene).items()}
 
 
 def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
@@ -84,7 +83,7 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
         if isinstance(drive, PlanarTable):
             stops = breaks(drive.pieces[-1], BEND)
             found.append(_levels(stops, True, times / drive.seconds) * drive.seconds)
-    curves = curves_of(scene.linkage, scene.numerics.interpolation)
+    curves = curves_of(scene)
     tabled = [load for load in mechanism.loads if load.name in curves]
     by_time = {load.name for load in tabled if load.seconds}
     straight = [(load, rows) for load in mechanism.loads for rows in load.straight.values()]

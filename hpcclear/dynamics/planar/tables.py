@@ -60,8 +60,8 @@ def _body(body: PlanarBody, joints: tuple[PlanarJoint, ...]) -> Body:
     return Body(body.name, *mass, points, body.start_angle, body.bending)
 
 
-def curves_of(planar: Planar, interpolation: str = "smooth") -> dict[str, Pieces]:
+def curves_of(scene: Scene) -> dict[str, Pieces]:
     """Tables of drives and loads by name, over the angle (rad) or time (s) that each goes by."""
-    turns = turns_of(planar)
+    planar, turns = scene.linkage, turns_of(scene.linkage)
     tabled = (one for one in (*planar.loads, *planar.drives) if one.table)
-    return {one.name: one.curve(turns, interpolation) for one in tabled}
+    return {one.name: one.curve(turns, scene.numerics.interpolation) for one in tabled}

@@ -106,7 +106,7 @@ def _curves_of_rows(scene: Scene, linkage: Linkage) -> tuple[Pieces, ...]:
         if isinstance(drive, (PlanarTable, PlanarRunUp))
         for part, pieces in zip(drive.curves, drive.pieces, strict=True)
     }
-    tables = curves_of(scene.linkage, scene.numerics.interpolation)
+    tables = curves_of(scene)
     return tuple(driven[name] if name in driven else tables[name] for name in linkage.curve_rows)
 
 
