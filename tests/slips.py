@@ -59,7 +59,7 @@ def drive(dice: random.Random) -> Content:
     return {
         "kind": "torque",
         "body": "crank",
-        "torque": f"{dice.uniform(0.1, 5.0):.3f} N*m",
+        "torque": f"{dice.uniform(0.1, 5.0):.4f} N*m",
         "initial_speed": f"{speed:.1f} rpm",
         "no_load_speed": f"{1.5 * speed:.1f} rpm",
     }
