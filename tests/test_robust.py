@@ -167,8 +167,9 @@ def test_moments_of_the_predictor_by_brute_force():
 
 def test_nothing_random_about_the_design_or_at_all():
     model, places = surrogate(), designs(5)
-    calm = RobustObjective(model, DESIGN, (), fixed={"C": 5e-4})
-    values = model.predict(np.column_stack([places, np.full(5, 5e-4)]))
+    calm = RobustObjective(model, (*DESIGN, "C"), ())
+    places = np.column_stack([places, np.full(5, 5e-4)])
+    values = model.predict(places)
     np.testing.assert_allclose(calm(places)[:, 0], values, rtol=1e-13)
     assert (calm(places)[:, 1] < 1e-13).all()
     assert calm(places[:0]).shape == (0, 2)

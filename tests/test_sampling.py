@@ -51,11 +51,7 @@ def test_ratio_follows_a_varying_length() -> None:
     assert ratio.max() <= 4
 
 
-def test_widened_design_reaches_beyond_the_box_and_holds_every_random_point() -> None:
-    wide = latin_hypercube(ROBUST, 400, names=OPTIMISATION, widen=ROBUST_CASE)
-    assert wide.column("u2").min() < -0.019
-    assert wide.column("u2").max() > 0.139
-    assert wide.column("C").min() >= 3e-4
+def test_a_widened_box_holds_every_random_point() -> None:
     region = box(ROBUST, OPTIMISATION, ROBUST_CASE)
     corners = [(0.105, 1.0), (0.105, 4.0), (0.42, 1.0), (0.42, 4.0)]
     for mass, ratio in corners:

@@ -48,9 +48,7 @@ class Pieces(NamedTuple):
         return self._replace(cubics=np.column_stack([c[:, 1:], np.zeros(len(c))]))
 
 
-def periodic(
-    rows: Rows, length: float, interpolation: str = "smooth", *, repeats: bool = True
-) -> Pieces:
+def periodic(rows: Rows, length: float, interpolation: str = "smooth") -> Pieces:
     """A table that repeats after a length in the unit of its places.
 
     "smooth": monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021), through every pair, no
@@ -71,7 +69,7 @@ def periodic(
     if x[0] > 0.0:  # the last piece goes on at the beginning
         begun = _moved(cubics[-1:], 1.0 - x[-1])
         x, cubics = np.concatenate([[0.0], x]), np.concatenate([begun, cubics])
-    return Pieces(x, cubics, length, repeats)
+    return Pieces(x, cubics, length)
 
 
 def level(rows: Rows, interpolation: str = "smooth") -> Pieces:

@@ -37,18 +37,17 @@ def latin_hypercube(
     samples: int | None = None,
     *,
     names: Sequence[str] | None = None,
-    widen: Iterable[str] = (),
     purpose: str = "train",
 ) -> Points:
     """The study's Latin hypercube over its variables, SI; a variable given as a ratio comes as the inertia it stands for.
 
-    `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. `widen`:
-    random inputs by whose reach the box is widened. Designs for different purposes are independent; the same purpose gives the
-    same points. Raises InputError if the scene has no study, a name is unknown, or a point makes no mechanism.
+    `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. Designs for
+    different purposes are independent; the same purpose gives the same points. Raises InputError if the scene has no study, a
+    name is unknown, or a point makes no mechanism.
     """
     study = scene.required_study
     count = _count(study, samples)
-    region = box(scene, names, widen)
+    region = box(scene, names)
     rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
     coordinates = region.lower + unit * (region.upper - region.lower)

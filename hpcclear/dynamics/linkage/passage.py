@@ -227,11 +227,11 @@ class _Walker:
         return None
 
 
-def _zero(function: Callable[[float], float], rounds: int = 60) -> float:
+def _zero(function: Callable[[float], float]) -> float:
     """Where a function of 0 to 1 that changes its sign vanishes, by the Illinois variant of regula falsi."""
     a, b = 0.0, 1.0
     fa, fb = function(a), function(b)
-    for _ in range(rounds):
+    for _ in range(60):
         c = b - fb * (b - a) / (fb - fa) if fb != fa else 0.5 * (a + b)
         fc = function(c)
         if fc == 0.0 or abs(b - a) < 1e-15:

@@ -27,7 +27,7 @@ class DerivedInput:
     name: str
     """The model's input."""
     of: tuple[str, ...]
-    """What it depends on: design variables, random or fixed inputs."""
+    """What it depends on: design variables and random inputs."""
     function: Callable[..., np.ndarray]
     """Arrays of those, in this order, to an array of the same (broadcast) shape. It must take its extremes at the corners
     of the random inputs' box (be monotone in each), since there it is checked that the support stays inside the model's
@@ -44,20 +44,18 @@ class Group:
 
 
 class Wiring:
-    """Who feeds whom: design variables, random and fixed inputs to the model's inputs."""
+    """Who feeds whom: design variables and random inputs to the model's inputs."""
 
     def __init__(
         self,
         names: Sequence[str],
         design_names: Sequence[str],
         random_inputs: Sequence[RandomVariable],
-        fixed: Mapping[str, float],
         derived: Sequence[DerivedInput],
     ) -> None:
         self.names = tuple(names)
         self.column = {name: k for k, name in enumerate(design_names)}
         self.random = {one.name: one for one in random_inputs}
-        self.fixed = dict(fixed)
         self.derived = {one.name: one for one in derived}
         self.groups = self._grouped()
 
@@ -67,11 +65,11 @@ class Wiring:
     def _grouped(self) -> tuple[Group, ...]:
         """Inputs joined while they share a random source; those without any are taken together."""
         parts: list[tuple[list[int], set[str]]] = []
-        calm: dict[bool, list[int]] = {True: [], False: []}
+        calm: list[int] = []
         for dim, name in enumerate(self.names):
             sources = {source for source in self._sources(name) if source in self.random}
             if not sources:
-                calm[any(s in self.column for s in self._sources(name))].append(dim)
+                calm.append(dim)
                 continue
             joined = [part for part in parts if part[1] & sources]
             parts = [part for part in parts if not part[1] & sources]
@@ -85,9 +83,7 @@ class Wiring:
             )
             for dims, sources in parts
         ]
-        return tuple(groups) + tuple(
-            Group(tuple(dims), (), moves) for moves, dims in calm.items() if dims
-        )
+        return (*groups, *([Group(tuple(calm), (), True)] if calm else ()))
 
     def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Independent draws of every random input, ``(1, samples)`` each."""
@@ -106,8 +102,6 @@ class Wiring:
         def value(name: str) -> np.ndarray:
             if name in self.random and not self.random[name].about_design:
                 return draws[name]
-            if name in self.fixed:
-                return np.full((1, 1), self.fixed[name])
             at_design = designs[:, self.column[name], None]
             return at_design + draws[name] if name in self.random else at_design
 

@@ -71,12 +71,12 @@ class RobustObjective:
     Called with designs ``(n, k)``, columns in the order of `design_names`, it returns ``(n, 2)``: mean and standard deviation,
     in the unit of the surrogate. The result of a design does not depend on the others in the call.
 
-    `fixed`: values of inputs that are neither varied nor random; `derived`: model inputs that are computed from both. The
-    nodes of derived inputs that depend on a random one are chosen at the designs `probes` (m, k): spread them over the design
-    space. `tolerance`: absolute error allowed in the integral of any kernel (at most 1) over one random input. `draws`: Monte
-    Carlo in place of quadrature: how many draws, and what makes them; or a function of designs (n, k) that returns draws (n
-    or 1, s) of each random input, which may vary together then. Designs that see the same ones are ranked without noise.
-    `joint`: of inputs that vary together, independent draws (count,) of them all.
+    `derived`: model inputs that are computed from designs and random inputs. The nodes of derived inputs that depend on a
+    random one are chosen at the designs `probes` (m, k): spread them over the design space. `tolerance`: absolute error allowed
+    in the integral of any kernel (at most 1) over one random input. `draws`: Monte Carlo in place of quadrature: how many
+    draws, and what makes them; or a function of designs (n, k) that returns draws (n or 1, s) of each random input, which may
+    vary together then. Designs that see the same ones are ranked without noise. `joint`: of inputs that vary together,
+    independent draws (count,) of them all.
 
     Raises InputError: a random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
     support that leaves the surrogate's domain.
@@ -88,7 +88,6 @@ class RobustObjective:
         design_names: Sequence[str],
         random_inputs: Sequence[RandomVariable],
         *,
-        fixed: Mapping[str, float] | None = None,
         derived: Sequence[DerivedInput] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
@@ -96,7 +95,7 @@ class RobustObjective:
         joint: Callable[[int, np.random.Generator], Mapping[str, np.ndarray]] | None = None,
     ) -> None:
         self.model = model
-        self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
+        self._wiring = Wiring(model.names, design_names, random_inputs, derived)
         self._draws: Drawn | None = None
         self._joint = joint
         if callable(draws):
@@ -216,8 +215,7 @@ class RobustObjective:
                 middle = 0.5 * (about[:, None] + about)
                 double *= apart * kernel_integral(one.law, middle, length / sqrt(2))
             else:
-                at = wiring.fixed[name] if name in wiring.fixed else design[wiring.column[name]]
-                row = np.exp(-0.5 * ((at - about) / length) ** 2)
+                row = np.exp(-0.5 * ((design[wiring.column[name]] - about) / length) ** 2)
                 single *= row
                 double *= row[:, None] * row
         mean = float(weights @ single)

@@ -16,7 +16,6 @@ from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
-    Sampler,
     fit_response_surface,
     latin_hypercube,
 )
@@ -89,12 +88,11 @@ def design_intervals(
     clearances: ArrayLike,
     rng: np.random.Generator,
     settings: IntervalSettings = DEFAULTS,
-    sample: Sampler = latin_hypercube,
 ) -> IntervalDesign:
     """Lay out the samples of every interval at every clearance.
 
-    `bounds` (d, 2): the global interval of every variable, in its own unit; `sample`: ``sample(n, bounds, rng)`` -> points
-    (n, d). Raises InputError: there would be too few points for a standard error.
+    `bounds` (d, 2): the global interval of every variable, in its own unit. Raises InputError: there would be too few points
+    for a standard error.
     """
     limits, gaps = np.asarray(bounds, float), np.asarray(clearances, float)
     needed = settings.needed(len(limits))
@@ -112,7 +110,7 @@ def design_intervals(
     intervals = np.stack([lower, upper], axis=2)
     intervals[0] = limits  # bit for bit
     blocks = [
-        np.column_stack([sample(n, interval, rng), np.full(n, gap)])
+        np.column_stack([latin_hypercube(n, interval, rng), np.full(n, gap)])
         for interval in intervals
         for gap in gaps
         for n in (settings.n_points, settings.n_test)

@@ -137,15 +137,14 @@ class Kriging:
             self.to_unit(points), self.packed[0], self.length_scales, self.packed[1], self.mean
         )
 
-    def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
-        """Kriging variance (n,) at points (n, d), in squared units of the training values, of the smooth part or of one noisy
-        evaluation. Raises InputError as in `predict`.
+    def variance(self, points: np.ndarray) -> np.ndarray:
+        """Kriging variance (n,) of the smooth part at points (n, d), in squared units of the training values. Raises InputError
+        as in `predict`.
         """
         points = inside(points, self.names, self.lower, self.upper)
         cross = self._covariance(self.to_unit(self.inputs), self.to_unit(points))
         known = np.einsum("ij,ij->j", cross, cho_solve(self._factor, cross))
-        left = np.maximum(self.signal_variance - known, 0.0)
-        return self.scale**2 * (left + (self.noise_variance if noise else 0.0))
+        return self.scale**2 * np.maximum(self.signal_variance - known, 0.0)
 
     @cached_property
     def _factor(self) -> tuple[Array, bool]:

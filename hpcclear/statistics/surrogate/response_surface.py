@@ -19,8 +19,6 @@ from hpcclear.statistics.surrogate.term_choice import choose_terms
 
 Evaluate = Callable[[Array], Array]
 """True function: points of shape (n, d) -> values of shape (n,), NaN where it failed."""
-Sampler = Callable[[int, Array, np.random.Generator], Array]
-"""``sample(n, bounds, generator)`` -> points of shape (n, d) inside bounds of shape (d, 2)."""
 
 OUTSIDE = 1e-9  # in half-lengths: how far rounding may carry a point past a bound
 

@@ -14,7 +14,7 @@ from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
-from hpcclear.statistics.surrogate.response_surface import Evaluate, Sampler, latin_hypercube
+from hpcclear.statistics.surrogate.response_surface import Evaluate, latin_hypercube
 
 Method = KrigingMethod | RegressionMethod
 """A kind of surrogate with its settings: it is fitted, and restored from stored arrays."""
@@ -57,7 +57,6 @@ def fit_subintervals(
     *,
     rng: np.random.Generator,
     names: Sequence[str] | None = None,
-    sample: Sampler = latin_hypercube,
     method: Method = KRIGING,
     snap: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> Piecewise:
@@ -65,16 +64,15 @@ def fit_subintervals(
 
     Boxes of one generation are evaluated in a single call, so that many ranks can share it.
 
-    `evaluate`: the true function, points (n, d) to values (n,), NaN where it failed; `sample`: ``sample(n, bounds, rng)``
-    draws points in a box, every box from a stream of its own, spawned from `rng`; `method`: what is fitted; `snap`: points
-    (n, d) to the nearest that exist. Raises InputError as the method's fit and `accuracy`: crossed bounds, or a box whose
-    samples (nearly) all failed.
+    `evaluate`: the true function, points (n, d) to values (n,), NaN where it failed; `rng`: points in a box come from a stream
+    of its own, spawned from this one; `method`: what is fitted; `snap`: points (n, d) to the nearest that exist. Raises
+    InputError as the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
     pending = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng)
     done: list[tuple[Leaf, Accuracy, bool]] = []
     counts = settings.samples, settings.test_samples
     for box in pending:
-        box.wanted = [snap(sample(n, box.bounds, box.rng)) for n in counts]
+        box.wanted = [snap(latin_hypercube(n, box.bounds, box.rng)) for n in counts]
     while pending:
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
@@ -84,11 +82,14 @@ def fit_subintervals(
             accepted = reached.meets(settings.r2_min, settings.rmae_max)
             if not accepted and box.resampled < settings.max_resamples:
                 box.resampled += 1
-                box.wanted = [snap(sample(settings.samples, box.bounds, box.rng)), box.tests[:0]]
+                box.wanted = [
+                    snap(latin_hypercube(settings.samples, box.bounds, box.rng)),
+                    box.tests[:0],
+                ]
                 following.append(box)
             elif not accepted and box.depth < settings.max_depth:
                 for half in _halves(box, model.steepest()):
-                    half.wanted = [snap(sample(n, half.bounds, half.rng)) for n in counts]
+                    half.wanted = [snap(latin_hypercube(n, half.bounds, half.rng)) for n in counts]
                     following.append(half)
             else:
                 done.append((model, reached, accepted))

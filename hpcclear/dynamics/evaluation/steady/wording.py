@@ -33,8 +33,8 @@ def why_missed(record: Any, target: float | None) -> str:
     )
 
 
-def in_a_line(record: Any, seconds: float | None = None) -> str:
-    """f of one record, or of a dataset of it, with its half-width: "3.36 +- 0.03 um (chaotic, 6200 revolutions, 1.9 s)"."""
+def in_a_line(record: Any) -> str:
+    """f of one record, or of a dataset of it, with its half-width: "3.36 +- 0.03 um (chaotic, 6200 revolutions)"."""
     f = float(objective(np.asarray(record["mean_gap"]))) * 1e6
     limit = float(record["objective_limit"]) * 1e6
     regime, period = Regime(int(record["regime"])), float(record["period"])
@@ -46,8 +46,6 @@ def in_a_line(record: Any, seconds: float | None = None) -> str:
             f"perturbations grow by e^{float(record['lyapunov_exponent']):.2g} per revolution"
         )
     parts.append(f"{int(record['steady_revolutions'])} revolutions")
-    if seconds is not None:
-        parts.append(f"{seconds:.1f} s")
     if not np.isfinite(limit):
         return f"{f:.4g} um, interval not known ({', '.join(parts)})"
     digits = max(1 - int(np.floor(np.log10(limit))), 0) if limit > 0.0 else 6
