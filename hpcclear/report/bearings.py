@@ -81,6 +81,20 @@ def bearings(response: Results) -> list[Bearing]:
     return found
 
 
+def outside(result: Results) -> str:
+    """Return what puts the contact model outside its range: the depth, of a response how deep, and the limit of Hertz theory;
+    "" of a contact with a limit of its own (`hpcclear.laws.declared.Geometry.deepest`)."""
+    scene = scene_in(str(result.attrs.get("scene", "")))
+    law = scene and scene.effects.contact
+    if not law or law.declared.deepest is not None:
+        return ""
+    if "penetration" not in result:
+        return "indentation above 25 % of the clearance, Hertz' limit"
+    deepest = np.nanmax(result["penetration"].to_numpy()[averaged(result)], axis=0)
+    share = np.nanmax(deepest / motion.clearances(result))
+    return f"indentation {100.0 * share:.0f} % of the clearance, Hertz' limit is 25 %"
+
+
 def named(joint: str) -> str:
     """Return a joint as tables name it: "crank_rod (O12)"."""
     short = motion.JOINT_NAMES.get(joint)

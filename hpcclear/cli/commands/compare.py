@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from hpcclear.report.compare import ComparedSignal
 
 
+MOST = 16
+"""Quantities that are printed without ``--details``, those with the largest errors."""
+
+
 @cli.command("look", "Compare a response with measurements.")
 @click.argument("file", type=cli.PATH)
 @click.argument("measured", type=cli.PATH)
@@ -63,7 +67,13 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
         for one in found.quantities:
             console().print(table(one.name, _norms(one)))
     else:
-        show_rows("", [(one.name, " ".join(_norms(one)[0])) for one in found.quantities])
+        import numpy as np
+
+        # the largest first; those of a quantity that is zero throughout, NaN, last
+        order = sorted(found.quantities, key=lambda one: -np.nan_to_num(one.norms["relative_rms"]))
+        rows = [(one.name, " ".join(_norms(one)[0])) for one in order[:MOST]]
+        more = len(order) - len(rows)
+        show_rows("", rows + [("", f"and {more} with less (--details)")] * bool(more))
     if output is not None:
         from hpcclear.report import overlay_figure, save
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hpcclear.base.outcome import Flag, Regime, Status
-from hpcclear.report import failures, spread
+from hpcclear.report import bearings, failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
@@ -100,8 +100,11 @@ def _trust(found: Results) -> Iterator[Trust]:
     if good.all():
         yield Trust(Level.GREEN, "No simulation failed", "quality")
     for flag, text in (
-        (Flag.BEYOND_HERTZ, "contact model outside its range, forces are indicative"),
-        (Flag.LATCHED, "a joint never left contact, f may depend on the tolerance"),
+        (
+            Flag.BEYOND_HERTZ,
+            f"contact model outside its range, {bearings.outside(found) or 'forces are indicative'}",
+        ),
+        (Flag.LATCHED, "a joint never left contact, f may depend on the integration tolerance"),
         (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
     ):
         if share := _share(found, flag):
@@ -158,7 +161,7 @@ def map_of_motion(content: Content) -> Screen | None:
         trust.append(
             Trust(
                 level,
-                f"{spread.percent(share)} of the cells: contact model outside its range",
+                f"{spread.percent(share)} of the cells: contact model outside its range, {bearings.outside(found)}",
                 "quality",
             )
         )

@@ -71,8 +71,8 @@ def _headline(lives: Results) -> str:
         return f"After {_long(cycles)} revolutions the clearance of {name} is {end}"
     value, low, high = spread(lives, "lifetime", cycles)[0]
     if not value.startswith("beyond"):
-        return f"Half of the machines last {value} revolutions (95 % CI {low} to {high})"
-    return f"More than half of the machines last {_long(cycles)} revolutions"
+        return f"Half of the machines reach a limit within {value} revolutions (95 % CI {low} to {high})"
+    return f"More than half of the machines reach no limit within {_long(cycles)} revolutions"
 
 
 def _long(count: float) -> str:
@@ -90,7 +90,7 @@ def _tiles(lives: Results) -> Iterator[Tile]:
         ends = (float(last[f"survival_{end}"]) for end in ("lower", "upper"))
         within = " to ".join(f"{end:.0%}" for end in ends)
         yield Tile(
-            f"survival, {_long(cycles)} rev.",
+            f"no limit reached, {_long(cycles)} rev.",
             f"{float(last['survival']):.0%}",
             within=f"95 % CI {within}",
         )

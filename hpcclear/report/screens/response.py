@@ -42,7 +42,7 @@ def screen(content: Content) -> Screen | None:
         header if loads else (),
         tuple(
             ScreenRow(
-                bearings.named(one.joint),
+                one.joint,
                 (
                     labels.quantity(one.peak, "N"),
                     bearings.degrees(one),
@@ -65,7 +65,7 @@ def _headline(response: Results, loads: Sequence[bearings.Bearing]) -> str:
     if not loads:
         return labels.sentence(f, response)
     worst = max(loads, key=lambda one: one.peak)
-    peak = f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {bearings.named(worst.joint)}"
+    peak = f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {worst.joint}"
     return labels.sentence(f"{peak}; {f}", response)
 
 
@@ -81,9 +81,7 @@ def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Til
     yield Tile("objective f", known, within=f"± {reach}" if reach else labels.NOT_CHECKED)
     for one in sorted(loads, key=lambda one: -one.peak)[:1]:
         angle = "" if bearings.degrees(one) == "–" else f"at {bearings.degrees(one)}"
-        yield Tile(
-            f"peak force, {bearings.named(one.joint)}", labels.quantity(one.peak, "N"), within=angle
-        )
+        yield Tile(f"peak force, {one.joint}", labels.quantity(one.peak, "N"), within=angle)
     drive = bearings.torque(response)
     mean = f"mean {labels.quantity(drive.mean, 'N m')}" if np.isfinite(drive.mean) else ""
     yield Tile("largest torque of the drive", labels.quantity(drive.peak, "N m"), within=mean)
@@ -94,7 +92,8 @@ def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Til
 def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Trust]:
     flags = int(response["flags"])
     if flags & Flag.BEYOND_HERTZ:
-        yield Trust(Level.RED, "Contact model outside its range: forces are indicative", "bearings")
+        why = bearings.outside(response) or "forces are indicative"
+        yield Trust(Level.RED, f"Contact model outside its range: {why}", "bearings")
     elif loads:
         yield Trust(Level.GREEN, "Contact model within its range", "bearings")
     if flags & Flag.TARGET_MISSED:
@@ -102,7 +101,7 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
     if flags & Flag.LATCHED:
         yield Trust(
             Level.AMBER,
-            "A joint never left contact: f may depend on the tolerance",
+            "A joint never left contact: f may depend on the integration tolerance",
             "bearings",
         )
     f, reach = float(response["objective"]), half_width(response)

@@ -10,7 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Status
 from hpcclear.base.verdict import Verdict
-from hpcclear.report import alike, scatter
+from hpcclear.report import alike, bearings, scatter
 from hpcclear.report.answer import (
     FAR,
     MANY,
@@ -267,8 +267,10 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     if share > MANY:
         level = Level.RED if share > MOST else Level.AMBER
         runs = "all runs" if share == 1.0 else f"{100 * share:.0f} % of runs"
-        text = f"Contact model outside its range ({runs})"
-        yield Trust(level, text, "bearings")
+        why = bearings.outside(of.files["verification"])
+        yield Trust(
+            level, f"Contact model outside its range ({runs}){why and ': '}{why}", "bearings"
+        )
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
