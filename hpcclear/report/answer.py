@@ -94,7 +94,7 @@ def _steps(of: Recommended) -> Iterator[str]:
     """What to do, the most useful first."""
     ours, best = of.ours, of.best
     if beyond_hertz(best) > MANY:
-        yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
+        yield "stiffer bearings or less load"
     prices = prices_of(best)
     if np.inf in prices:
         yield "a smaller numerics.rtol (or target_error), to decide the constraints"

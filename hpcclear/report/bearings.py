@@ -89,7 +89,7 @@ def outside(result: Results) -> str:
     if not law or law.declared.deepest is not None:
         return ""
     if "penetration" not in result:
-        return "indentation above 25 % of the clearance, Hertz' limit"
+        return "indentation above 25 % of clearance, Hertz' limit"
     deepest = np.nanmax(result["penetration"].to_numpy()[averaged(result)], axis=0)
     share = np.nanmax(deepest / motion.clearances(result))
     return f"indentation {100.0 * share:.0f} % of the clearance, Hertz' limit is 25 %"

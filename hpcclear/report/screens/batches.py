@@ -145,7 +145,7 @@ def map_of_motion(content: Content) -> Screen | None:
         tiles = (
             Tile("largest Lyapunov exponent", f"{growth.max():.3g}", within="per revolution"),
             Tile("period", known or "none", within="revolutions"),
-            Tile("f", labels.between(float(f.min()), float(f.max()), unit)),
+            Tile("range of f", labels.between(float(f.min()), float(f.max()), unit)),
         )
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
     level = Level.GREEN if count == cells else Level.AMBER

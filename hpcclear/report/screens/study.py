@@ -267,10 +267,8 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     if share > MANY:
         level = Level.RED if share > MOST else Level.AMBER
         runs = "all runs" if share == 1.0 else f"{100 * share:.0f} % of runs"
-        why = bearings.outside(of.files["verification"])
-        yield Trust(
-            level, f"Contact model outside its range ({runs}){why and ': '}{why}", "bearings"
-        )
+        why = bearings.outside(of.files["verification"]) or "contact model outside its range"
+        yield Trust(level, f"{why[0].upper()}{why[1:]} ({runs})", "bearings")
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
