@@ -112,12 +112,12 @@ def _twins(ours: Results, best: Results) -> list[str]:
     return [name for name, one in zip(names, alike, strict=True) if one and name != own]
 
 
-def spans(ours: Results, best: Results, names: list[str]) -> str:
-    """Return the ranges of the variables in which these designs and the best differ."""
+def spans(ours: Results, best: Results, names: list[str], most: int | None = None) -> str:
+    """Return the ranges of the variables, at most so many, in which these designs and the best differ."""
     alike, texts = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names])), []
     for variable in labels.design_variables(alike):
         low, high = float(np.min(variable)), float(np.max(variable))
         if high - low > SAME * abs(high):
             unit = str(variable.attrs["units"])
             texts.append(f"{labels.words(variable)} from {labels.between(low, high, unit)}")
-    return ", ".join(texts)
+    return ", ".join(texts[:most])

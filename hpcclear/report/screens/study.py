@@ -243,7 +243,7 @@ def _spans(best: Results, base: Results | None) -> dict[str, Span]:
 def _remark(of: Recommended) -> str:
     """Whether other designs are as good."""
     twins = alike.others(of.ours, of.best)
-    spans = alike.spans(of.ours, of.best, twins) if twins else ""
+    spans = alike.spans(of.ours, of.best, twins, 1) if twins else ""
     more = spans and f" ({spans})"
     return f"{len(twins) + 1} equivalent designs{more}: choose by cost." if twins else ""
 
