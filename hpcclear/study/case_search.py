@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from functools import partial
+from itertools import compress
 
 import moocore
 import numpy as np
@@ -11,30 +12,34 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.merit import SPAN
 from hpcclear.scene.cases import Case
-from hpcclear.scene.domain import box, to_coordinates
+from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
-from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import NEAR, Beliefs, Known, Space
 from hpcclear.statistics.search.pareto import cut
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import contest, goals, truth
 from hpcclear.study.budget import AIM, AIMS, HEDGES, OFF, SETTLED, SURE, all_over, first_length
-from hpcclear.study.failures import CLOSE, FEW, Failures, excess_of
+from hpcclear.study.failures import CLEAR, CLOSE, FEW, Failures
+from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice, choices, distinct
 from hpcclear.study.run import StudyRun
+from hpcclear.study.simulated import Simulated
 
 PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
-WORTH, AREA, PATIENCE = 0.1, 0.005, 2
-"""What another design or more simulations are worth at least: of the accuracy requested, and of the area below a front of two
-objectives, with more a fifth of that of the distance to it; rounds in a row that are not, after which the search ends."""
+WORTH, FRONT, AREA, PATIENCE = 0.3, 1.0, 0.01, 1
+"""What another design or more simulations are worth at least: of the accuracy requested, in what decides and in other
+directions, and of the area below a front of two objectives, with more a fifth of that of the distance to it; rounds in a row
+that are not, after which the search ends."""
 
-LEADERS, AWAY = 3, 0.05
-"""Designs that get more simulations first; how far `HEDGES` are off others, over the ranges."""
+LEADERS, KNOWN, AWAY = 3, 0.25, 0.05
+"""Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do; how far
+`HEDGES` are off others, over the ranges."""
 
 SMALL, SHOWN = 0.012, 3.0
 """Of the same for other statistics than probabilities: 0.24 % below the threshold is sought; and standard errors after the most
@@ -50,16 +55,17 @@ class CaseSearch:
 
     Attributes
     ----------
-    choices : list of Choice
-    made : list of arrays, shape (responses, replicates, values)
-        Their simulations, as `hpcclear.study.truth.made` returns them.
+    designs : Simulated
     """
 
-    def __init__(self, run: StudyRun, case: Case, start: Sequence[Choice]) -> None:
+    def __init__(
+        self, run: StudyRun, case: Case, start: Sequence[Choice], models: Sequence[Piecewise]
+    ) -> None:
         self._run, self._case, settings = run, case, run.study.verification
         self._size = truth.search_length(run.study)
         self._names = run.study.design_variables(case.name)
         region, self._rng = box(run.scene, self._names), run.rng("search", case.name)
+        guesses = Guesses(run, case, models, self._size)
         directions = np.eye(len(case.goals))
         if case.plain:  # mean + 2 standard deviations are what a design is recommended by
             directions = np.vstack([[1.0, SPAN], directions])
@@ -69,9 +75,10 @@ class CaseSearch:
             goals.exact_in(run.scene, case),
             self._margins(AIM),
             partial(snapped, run.study, self._names),
+            guesses.trends(region, self._rng),
         )
-        others = [*directions[1:], None] if len(case.goals) > 1 else []
-        turns = [part for one in others for part in (directions[0], one)] or [directions[0]]
+        others = [*range(1, len(directions)), None] if len(case.goals) > 1 else []
+        turns = [part for one in others for part in (0, one)] or [0]
         self._turns = itertools.cycle(turns)
         self._most = settings.infill_rounds * settings.infill_designs
         self._batch = max(settings.infill_designs // PARTS, 1)
@@ -79,21 +86,19 @@ class CaseSearch:
         self._least = AREA if len(case.goals) < 3 else AREA / 5.0
         unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
         wide = choices(run, case.name, region.lower + unit * (region.upper - region.lower))
-        self.choices = distinct([*start, *wide])
-        self._begun = len(self.choices)
-        self.made = [truth.nothing(run)] * self._begun
+        self.designs = Simulated(run, case, guesses, distinct([*start, *wide]))
+        self._begun = len(self.designs)
         self._failures = Failures(run, case, self._rng)
         self._near: set[int] = set()
         self._agree = [AGREE[one.statistic != "exceedance"] for one in case.kept]
-        self._seen: dict[tuple[int, int], tuple[Array, Array]] = {}
 
     # -- asking ------------------------------------------------------------------------------------
 
     def ask(self) -> list[int]:
         """Numbers of the designs that are simulated next; none at the end."""
-        if not self.made[0].size:
+        if not self.designs.made[0].size:
             return list(range(self._begun))
-        count = min(self._batch, self._begun + self._most - len(self.choices))
+        count = min(self._batch, self._begun + self._most - len(self.designs))
         if self._idle == PATIENCE or count <= 0:
             return []
         try:
@@ -101,45 +106,57 @@ class CaseSearch:
         except InputError:  # too few designs that did not fail for a model
             region = self._space.bounds
             unit = unit_lhs(count, len(region), self._rng)
-            return self._added(region[:, 0] + unit * np.diff(region, axis=1)[:, 0])
-        rows, worthy = self._leaders(beliefs), False
+            return self.designs.add(region[:, 0] + unit * np.diff(region, axis=1)[:, 0])
+        rows, left = self._leaders(beliefs), list[tuple[float, Array]]()
         for _ in range(count):
-            if (len(self.choices) - self._begun) % improvement.EXPLORED == improvement.EXPLORED - 1:
+            if (len(self.designs) - self._begun) % improvement.EXPLORED == improvement.EXPLORED - 1:
                 point, worth = improvement.farthest(beliefs)
                 if worth > 0.0:
                     beliefs.take(point)
-                    rows += self._added(point[None])
+                    rows += self.designs.add(point[None])
                 continue
-            direction = next(self._turns)
+            turn = next(self._turns)
+            direction = None if turn is None else self._space.directions[turn]
             point, worth = improvement.proposed(beliefs, direction)
             size = 0.0 if direction is None else self._accuracy(beliefs, direction)
             if size > 0.0:
                 self._hope = worth / size
-            least = WORTH * size
+            least = (FRONT if turn else WORTH) * size
             row, again = self._contender(beliefs, direction, rows)
             new = worth / first_length(self._run.study)
-            worthy |= max(worth, again * self.made[row].shape[2]) > (least or self._least)
-            if again > new and again * self.made[row].shape[2] > least:
+            if again > new and again * self.designs.made[row].shape[2] > least:
                 rows.append(row)
-            elif worth > 0.0:
+            elif worth > (least or self._least):
                 beliefs.take(point)
-                rows += self._added(point[None])
-        self._idle = 0 if worthy else self._idle + 1
+                rows += self.designs.add(point[None])
+            elif worth > 0.0:
+                left.append((worth / (least or self._least), point))
+        self._idle = self._idle + 1 if len(left) == count else 0
+        if self._idle and left:  # the models may be wrong
+            point = max(left, key=lambda one: one[0])[1]
+            beliefs.take(point)
+            rows += self.designs.add(point[None])
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):
             means, _ = beliefs.shortfalls(fresh)
-            first = len(self.choices) - len(fresh)
+            first = len(self.designs) - len(fresh)
             self._near |= {first + int(k) for k in np.flatnonzero(abs(means.max(axis=1)) < CLOSE)}
         return rows
 
     def _leaders(self, beliefs: Beliefs) -> list[int]:
         """The design that is taken for the best, at first some, unless it has as many simulations as a design may have: what
         few simulations flatter is found out before others follow it, and what all get wrong by them is known."""
-        merit = np.where(beliefs.finite, beliefs.believed @ self._space.directions[0], np.inf)
+        main = self._space.directions[0]
+        merit = np.where(beliefs.finite, beliefs.believed @ main, np.inf)
         merit = np.where(beliefs.allowed | ~beliefs.allowed.any(), merit, np.inf)
-        first = max(one.shape[2] for one in self.made) == first_length(self._run.study)
+        first = self.designs.sizes.max() == first_length(self._run.study)
         rows = np.argsort(merit, kind="stable")[: LEADERS if first else 1]
-        return [int(k) for k in rows if self.made[k].shape[2] < self._size]
+        size = KNOWN * self._accuracy(beliefs, main)
+        return [
+            int(k)
+            for k in rows
+            if self.designs.made[k].shape[2] < self._size and self.designs.error(k, main) > size
+        ]
 
     def _contender(
         self, beliefs: Beliefs, direction: Array | None, taken: Sequence[int]
@@ -147,7 +164,7 @@ class CaseSearch:
         """The known design of which more simulations are worth most, and how much for each point of its replicates."""
         if direction is None:
             return 0, 0.0
-        sizes = np.array([one.shape[2] for one in self.made[: len(beliefs.known.designs)]])
+        sizes = self.designs.sizes[: len(beliefs.known.designs)]
         merit = np.where(beliefs.allowed, beliefs.believed @ direction, np.inf)
         apart = self._apart(int(merit.argmin()), direction)[: len(sizes)]
         worth = improvement.replications(beliefs, direction, apart) / np.maximum(sizes, 1)
@@ -163,52 +180,21 @@ class CaseSearch:
             self._run, self._case, direction, known[(known @ direction).argmin()]
         )
 
-    def _added(self, points: Array) -> list[int]:
-        """Numbers of new designs at sampling coordinates, (n, d)."""
-        fresh = choices(self._run, self._case.name, points)
-        self.choices += fresh
-        self.made += [truth.nothing(self._run)] * len(fresh)
-        return list(range(len(self.choices) - len(fresh), len(self.choices)))
-
     # -- what is known -------------------------------------------------------------------------------
 
     def _beliefs(self) -> Beliefs:
         return Beliefs(self._known(), self._space, self._rng)
 
     def _known(self) -> Known:
-        """Objectives and constraints of all designs so far, with their standard errors, as if all had the most simulations."""
-        designs = np.array([list(one.design.values()) for one in self.choices])
-        places = to_coordinates(self._run.scene, self._names, designs)
-        places = np.clip(places, *self._space.bounds.T)  # round-off at the border
-        sizes = np.array([one.shape[2] for one in self.made])
-        found = np.array([self._at(row, length)[0] for row, length in enumerate(sizes)])
-        off, length = np.zeros(found.shape[2]), int(sizes.max()) // 2
-        while length >= sizes.min():
-            longer = np.flatnonzero(sizes > length).tolist()
-            steps = [self._at(k, 2 * length)[0][0] - self._at(k, length)[0][0] for k in longer]
-            known = np.isfinite(steps)
-            off += np.where(known, steps, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-            found[sizes == length, 0] += off
-            length //= 2
-        count = len(self._case.goals)
+        """Objectives and constraints of all designs so far, with their standard errors."""
+        found, count = self.designs.known(), len(self._case.goals)
         for row, k in itertools.product(self._failures.drawn, range(len(self._failures.goals))):
             column = count + self._case.kept.index(self._failures.goals[k])
             found[row, :, column] = self._failures.excess(row, k, *found[row, :, column])
         (values, errors), (excess, doubts) = (
             np.moveaxis(part, 1, 0) for part in np.split(found, [count], axis=2)
         )
-        return Known(places, values, errors, excess, doubts)
-
-    def _at(self, row: int, length: int) -> tuple[Array, Array]:
-        """Objectives and constraints of a design by so many points of each replicate, and standard errors, (2, k), and what
-        replicates shift objectives, (m, replicates): by the same points designs differ by less than their errors."""
-        if (row, length) not in self._seen:
-            made, design = self.made[row][..., :length], self.choices[row].design
-            values = [goals.goal_value(goal, made, design, 0.95) for goal in self._case.goals]
-            pairs = [(one.value, float(spread(one.shifts[None])[0])) for one in values]
-            pairs += [excess_of(goal, made, design) for goal in self._case.kept]
-            self._seen[row, length] = np.array(pairs).T, np.array([one.shifts for one in values])
-        return self._seen[row, length]
+        return Known(self.designs.places(self._space.bounds), values, errors, excess, doubts)
 
     # -- probabilities -------------------------------------------------------------------------------
 
@@ -217,12 +203,16 @@ class CaseSearch:
         if not self._failures.goals:
             return
         columns = [self._case.kept.index(one) for one in self._failures.goals]
-        excess = self._known().excess[:, columns].max(axis=1)
+        now = self._known()
+        excess, errors = (one[:, columns].max(axis=1) for one in (now.excess, now.excess_errors))
         known = np.flatnonzero(np.isfinite(excess)).tolist()
         if known and not self._failures.densities:
-            self._failures.prepare(self.choices[min(known, key=lambda row: abs(excess[row]))])
+            self._failures.prepare(
+                self.designs.choices[min(known, key=lambda row: abs(excess[row]))]
+            )
         near = {row for row in known if abs(excess[row]) < CLOSE} | self._near
-        self._failures.draw(self.choices, sorted(near - set(self._failures.drawn)), FEW)
+        near = {row for row in near if not errors[row] < CLEAR}
+        self._failures.draw(self.designs.choices, sorted(near - set(self._failures.drawn)), FEW)
         self._near = set()
 
     def settle(self) -> None:
@@ -237,11 +227,11 @@ class CaseSearch:
             apart = (abs(beliefs.known.designs - point) / width).max(axis=1)
             row = int(apart.argmin())
             if apart[row] > NEAR:
-                (row,) = self._added(point[None])
-            while self.made[row].shape[2] < self._size:
+                (row,) = self.designs.add(point[None])
+            while self.designs.made[row].shape[2] < self._size:
                 lengthened(self._run, [(self, [row])])
             if self._failures.densities:
-                self._failures.draw(self.choices, [row], SURE)
+                self._failures.draw(self.designs.choices, [row], SURE)
             guess, _ = beliefs.shortfalls(point[None], np.zeros(len(self._case.kept)))
             if (abs(self._known().excess[row] - guess[0]) < self._agree).all():
                 return
@@ -254,12 +244,14 @@ class CaseSearch:
         try:
             beliefs = self._beliefs()
         except InputError:  # too few designs that did not fail for a model
-            return self.choices[: self._run.study.verification.designs]
+            return self.designs.choices[: self._run.study.verification.designs]
         known, main = beliefs.known.designs, self._space.directions[0]
         kept = np.flatnonzero(beliefs.allowed)
         if not len(kept):
             broken = np.where(beliefs.finite, beliefs.shortfalls(known)[0].max(axis=1), np.inf)
-            return [self.choices[row] for row in np.argsort(broken, kind="stable")[: 1 + HEDGES]]
+            return [
+                self.designs.choices[row] for row in np.argsort(broken, kind="stable")[: 1 + HEDGES]
+            ]
         means = beliefs.believed[kept]
         rows = [int(kept[(means @ one).argmin()]) for one in self._space.directions]
         designs = self._run.study.verification.designs
@@ -294,20 +286,13 @@ class CaseSearch:
                 )
             ]
         fresh = choices(self._run, self._case.name, np.reshape(points, (-1, known.shape[1])))
-        return distinct([*(self.choices[row] for row in rows), *fresh])
+        return distinct([*(self.designs.choices[row] for row in rows), *fresh])
 
     def _apart(self, row: int, direction: Array) -> Array:
-        """Standard errors of the differences of all designs from one, in a direction, (n,): the same scatter is in both, but
-        less so the more they differ, which no model of the values sees."""
-        if not any(
-            weight and not goal.exact
-            for weight, goal in zip(direction, self._case.goals, strict=True)
-        ):
-            return np.zeros(len(self.choices))
-        sizes = [one.shape[2] for one in self.made if one.size]
-        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points in common
-        shifts = np.array([self._at(k, n)[1] - self._at(row, n)[1] for k, n in both])
-        return np.nan_to_num(spread(np.einsum("knr,n->kr", shifts, direction)))
+        """Standard errors of the differences of all designs from one in a direction, (n,); 0 in what is exact."""
+        if all(goal.exact for goal in compress(self._case.goals, direction != 0.0)):
+            return np.zeros(int((self.designs.sizes > 0).sum()))
+        return self.designs.apart(row, direction)
 
     def _margins(self, aim: float, errors: Array | None = None) -> Array:
         """By how much the constraints are kept where a share of the allowed probability is taken, (constraints,); of other
@@ -336,7 +321,7 @@ class CaseSearch:
 
 def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -> None:
     """Twice the simulations of designs of several cases, and first ones of new designs."""
-    where = [(one, row) for one, rows in asked for row in rows]
+    where = [(one.designs, row) for one, rows in asked for row in rows]
     chosen = [one.choices[row] for one, row in where]
     made = [one.made[row] for one, row in where]
     for length in sorted({one.shape[2] for one in made}):

@@ -27,9 +27,9 @@ from hpcclear.study.run import StudyRun
 PLENTY = 0.2
 """Probability that plain samples show as well as weighted ones."""
 
-CLOSE, FEW, PILOT, ENOUGH = 1.0, 8, 256, 4
-"""Indices from the threshold within which designs get weighted draws; these of each repeat; draws of each level of their pilot;
-failures for each random input from which a density is fitted anew."""
+CLOSE, CLEAR, FEW, PILOT, ENOUGH = 1.0, 0.1, 8, 256, 4
+"""Indices from the threshold within which designs get weighted draws, unless their standard error is less; these of each
+repeat; draws of each level of their pilot; failures for each random input from which a density is fitted anew."""
 
 HITS, FAR, BEYOND = 3, 4.0, 0.1
 """Failures from which on their share is an index, else the largest values are; shortfall of an index beyond which the order
@@ -119,27 +119,38 @@ class Failures:
         return importance.fitted(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
 
-def excess_of(goal: Constraint, made: Array, design: Mapping[str, float]) -> tuple[float, float]:
-    """By how much a design breaks a constraint by its simulations, (responses, replicates, n), and the standard error:
-    relative to the threshold, or of a probability in reliability indices."""
+class Excess(NamedTuple):
+    """By how much a constraint is broken, its standard error, and what each replicate shifts it, (r,)."""
+
+    value: float
+    error: float
+    shifts: Array
+
+
+def excess_of(goal: Constraint, made: Array, design: Mapping[str, float]) -> Excess:
+    """By how much a design breaks a constraint by its simulations, (responses, replicates, n): relative to the threshold, or
+    of a probability in reliability indices."""
     one = goals.goal_value(goal, made, design, 0.95)
     if goal.statistic != "exceedance":
         scale = abs(goal.most) or 1.0
-        return (one.value - goal.most) / scale, float(spread(one.shifts[None])[0]) / scale
+        shifts = one.shifts / scale
+        return Excess((one.value - goal.most) / scale, float(spread(shifts[None])[0]), shifts)
     f = made[goal.place][np.isfinite(made[goal.place])]
     part = len(f) // REPLICATES
     if part < 1 or len(f) < FEWEST:
-        return np.nan, np.nan
+        return Excess(np.nan, np.nan, np.full(REPLICATES, np.nan))
     if HITS <= (f > goal.limit).sum() <= len(f) - HITS:
-        return _index_of(goal, one.value, float(spread(one.shifts[None])[0]))
+        value, error = _index_of(goal, one.value, own := float(spread(one.shifts[None])[0]))
+        return Excess(value, error, one.shifts * (error / own if own > 0.0 else 0.0))
     parts = f[: part * REPLICATES].reshape(REPLICATES, part)
     without = np.array([np.delete(parts, k, axis=0).ravel() for k in range(REPLICATES)])
     value = float(goals.shortfall(goal, goal.most, f[None])[0])
     each = goals.shortfall(goal, goal.most, without)
-    error = float(np.sqrt((REPLICATES - 1) * each.var()))  # jackknife
+    shifts = (REPLICATES - 1) * (each.mean() - each)  # jackknife
     beyond = max(of_share(goal.most) - value + float(ndtri(1.0 / len(f))), 0.0)
     value = min(value, FAR * (1.0 + np.log(max(value / FAR, 1.0))))  # far off: which way is better
-    return max(float(value), -FAR), error + BEYOND * (1.0 + beyond)
+    error = float(spread(shifts[None])[0]) + BEYOND * (1.0 + beyond)
+    return Excess(max(float(value), -FAR), error, shifts)
 
 
 def _index_of(goal: Constraint, share: float, error: float) -> tuple[float, float]:

@@ -14,13 +14,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.case_search import CaseSearch, lengthened
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.surrogates import of_further
 
 
-def search(run: StudyRun, start: Sequence[Choice]) -> Result:
-    """Designs of each case to verify beside the swarm's ends, from all designs of the swarm.
+def search(run: StudyRun, start: Sequence[Choice], model: Piecewise) -> Result:
+    """Designs of each case to verify beside the swarm's ends, from all designs of the swarm and the surrogate of f.
 
     Returns
     -------
@@ -33,7 +35,7 @@ def search(run: StudyRun, start: Sequence[Choice]) -> Result:
     InputError
         If all simulations of a round fail.
     """
-    found, remarks = searched(run, start)
+    found, remarks = searched(run, start, [model, *of_further(run, model)])
     names = run.study.optimisation
     rows = [[one.design.get(name, np.nan) for name in names] for one in found]
     return {
@@ -43,14 +45,16 @@ def search(run: StudyRun, start: Sequence[Choice]) -> Result:
     }
 
 
-def searched(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[str]]:
-    """The designs and remarks of `search`."""
+def searched(
+    run: StudyRun, start: Sequence[Choice], models: Sequence[Piecewise] = ()
+) -> tuple[list[Choice], list[str]]:
+    """The designs and remarks of `search`, from surrogates of f and of further responses, if there are any."""
     from threadpoolctl import threadpool_limits
 
     if not run.study.verification.infill_rounds:
         return [], []
     searches = [
-        CaseSearch(run, case, [one for one in start if one.case == case.name])
+        CaseSearch(run, case, [one for one in start if one.case == case.name], models)
         for case in run.study.cases
     ]
     with threadpool_limits(limits=1, user_api="blas"):  # the same bits, and faster

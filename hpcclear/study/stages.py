@@ -109,7 +109,7 @@ def _search(run: StudyRun, models: Models) -> SearchOutcome:
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
-    result = run.stage("search", search.search, [*ends, *between])
+    result = run.stage("search", search.search, [*ends, *between], models.searched)
     papers = ends if is_the_papers(run.scene) else []
     better = search.found_in(run, result)
     designs = optimisation.distinct([*papers, *better]) if better else [*ends, *between]

@@ -92,6 +92,8 @@ class Space:
         By how much each constraint is to be kept at least, so that it can be shown.
     snap : function
         Designs (n, d) to the nearest ones that there are: values from a catalogue, say.
+    trends : sequence of functions, length m + c
+        What a cheaper model says of objectives, then of constraints, of designs (n, d) to (n,); empty without one.
     """
 
     bounds: Array
@@ -99,6 +101,28 @@ class Space:
     exact: Sequence[Exact | None]
     margins: Array
     snap: Snap = lambda designs: designs
+    trends: Sequence[Exact] = ()
+
+
+@dataclass(frozen=True)
+class Trended:
+    """A Kriging model of what a multiple of a trend leaves."""
+
+    rest: Kriging
+    slope: float
+    trend: Exact
+
+    def predict(self, points: Array) -> Array:
+        """What is expected at points, (n, d) to (n,)."""
+        return self.rest.predict(points) + self.slope * self.trend(points)
+
+    def variance(self, points: Array) -> Array:
+        """What is not known of it, (n, d) to (n,)."""
+        return self.rest.variance(points)
+
+
+def _flat(points: Array) -> Array:
+    return np.zeros(len(points))
 
 
 class Beliefs:
@@ -119,15 +143,19 @@ class Beliefs:
 
     def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
         self.known, self.space, self.rng = known, space, rng
+        count = len(space.exact)
+        trends = space.trends or [_flat] * (count + known.excess.shape[1])
         self.models = [
-            None if exact else _fitted(known.designs, values, errors, space.bounds, rng)
-            for values, errors, exact in zip(
-                known.values.T, known.errors.T, space.exact, strict=True
+            None if exact else _trended(known.designs, values, errors, trend, space.bounds, rng)
+            for values, errors, exact, trend in zip(
+                known.values.T, known.errors.T, space.exact, trends[:count], strict=True
             )
         ]
         self.limits = [
-            _fitted(known.designs, values, errors, space.bounds, rng)
-            for values, errors in zip(known.excess.T, known.excess_errors.T, strict=True)
+            _trended(known.designs, values, errors, trend, space.bounds, rng)
+            for values, errors, trend in zip(
+                known.excess.T, known.excess_errors.T, trends[count:], strict=True
+            )
         ]
         self.pending = known.designs[:0]
         self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
@@ -173,6 +201,21 @@ class Beliefs:
         return np.vstack([self.believed[self.allowed], self.means(later)])
 
 
+def _trended(
+    designs: Array,
+    values: Array,
+    errors: Array,
+    trend: Exact,
+    bounds: Array,
+    rng: np.random.Generator,
+) -> Trended:
+    guess, known = trend(designs), np.isfinite(values)
+    steps = guess[known] - guess[known].mean() if known.any() else guess[known]
+    squares = float(steps @ steps)
+    slope = float(steps @ values[known]) / squares if squares > 0.0 else 0.0
+    return Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
+
+
 def _fitted(
     designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
 ) -> Kriging:
@@ -200,16 +243,18 @@ def _fitted(
     )
 
 
-def _extended(model: Kriging, point: Array) -> Kriging:
+def _extended(model: Trended, point: Array) -> Trended:
     """A model with one more value, the one that it expects: which changes no other expectation, and has no weight."""
-    shares = None if model.shares is None else np.append(model.shares, np.median(model.shares))
-    return replace(
-        model,
-        inputs=np.vstack([model.inputs, point]),
-        values=np.append(model.values, model.predict(point[None])),
-        alpha=np.append(model.alpha, 0.0),
+    rest = model.rest
+    shares = None if rest.shares is None else np.append(rest.shares, np.median(rest.shares))
+    more = replace(
+        rest,
+        inputs=np.vstack([rest.inputs, point]),
+        values=np.append(rest.values, rest.predict(point[None])),
+        alpha=np.append(rest.alpha, 0.0),
         shares=shares,
     )
+    return replace(model, rest=more)
 
 
 def proposed(beliefs: Beliefs, direction: Array | None) -> tuple[Array, float]:
@@ -249,9 +294,9 @@ def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0)
     noise = np.zeros(len(rows))
     for column, (model, weight) in enumerate(zip(beliefs.models, direction, strict=True)):
         if model is not None and weight:
-            places = np.cumsum(np.isfinite(beliefs.known.values[:, column])) - 1
-            shares = 1.0 if model.shares is None else model.shares[places[rows]]
-            noise += weight**2 * model.scale**2 * model.noise_variance * shares
+            rest, places = model.rest, np.cumsum(np.isfinite(beliefs.known.values[:, column])) - 1
+            shares = 1.0 if rest.shares is None else rest.shares[places[rows]]
+            noise += weight**2 * rest.scale**2 * rest.noise_variance * shares
     unseen = np.broadcast_to(apart, len(found))[rows] ** 2 / 2.0
     moved = np.sqrt(left**2 / (left + noise + 1e-300) + unseen)
     order = np.argsort(own)

@@ -1,0 +1,141 @@
+"""The designs that a search has simulated, and what they come to: by few simulations, and by what a surrogate says of more.
+
+Sources: of what a surrogate explains (control variates) P. Glasserman, "Monte Carlo Methods in Financial Engineering" (2003),
+section 4.1, doi:10.1007/978-0-387-21617-1.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.scene.cases import Case
+from hpcclear.scene.domain import to_coordinates
+from hpcclear.statistics.random.replicates import spread
+from hpcclear.study import goals, truth
+from hpcclear.study.budget import first_length
+from hpcclear.study.failures import excess_of
+from hpcclear.study.guesses import Guesses
+from hpcclear.study.optimisation import Choice, choices
+from hpcclear.study.run import StudyRun
+
+Asked = tuple[Array, Array]
+"""Objectives and constraints of a design with standard errors, (2, k), and what replicates shift them, (k, replicates)."""
+
+
+class Simulated:
+    """Designs of a case in their order, with their simulations.
+
+    Attributes
+    ----------
+    choices : list of Choice
+    made : list of arrays, shape (responses, replicates, values)
+        As `hpcclear.study.truth.made` returns them.
+    """
+
+    def __init__(
+        self, run: StudyRun, case: Case, guesses: Guesses, start: Sequence[Choice]
+    ) -> None:
+        self._run, self._case, self._guesses = run, case, guesses
+        self.choices = list(start)
+        self.made = [truth.nothing(run)] * len(self.choices)
+        self._at = {False: dict[tuple[int, int], Asked](), True: dict[tuple[int, int], Asked]()}
+        self._guessed: dict[int, Array] = {}
+        self._slopes: tuple[int, Array] = 0, np.zeros(0)
+
+    def __len__(self) -> int:
+        return len(self.choices)
+
+    @property
+    def sizes(self) -> Array:
+        """Points of each replicate of each design, (n,)."""
+        return np.array([one.shape[2] for one in self.made])
+
+    def add(self, points: Array) -> list[int]:
+        """Numbers of new designs at sampling coordinates, (n, d)."""
+        fresh = choices(self._run, self._case.name, points)
+        self.choices += fresh
+        self.made += [truth.nothing(self._run)] * len(fresh)
+        return list(range(len(self.choices) - len(fresh), len(self.choices)))
+
+    def places(self, bounds: Array) -> Array:
+        """Sampling coordinates of all designs, (n, d), within bounds, (d, 2), but for round-off."""
+        names = self._run.study.design_variables(self._case.name)
+        designs = np.array([list(one.design.values()) for one in self.choices])
+        return np.clip(to_coordinates(self._run.scene, names, designs), *bounds.T)
+
+    def known(self) -> Array:
+        """What all designs come to, and standard errors, (n, 2, k), as if all had as many simulations as the longest: those
+        that have few are moved by what further ones change of others on average."""
+        sizes = self.sizes
+        found = np.array([self.of(row, length)[0] for row, length in enumerate(sizes)])
+        off, length = np.zeros(found.shape[2]), int(sizes.max()) // 2
+        while length >= sizes.min():
+            longer = np.flatnonzero(sizes > length).tolist()
+            steps = [self.of(k, 2 * length)[0][0] - self.of(k, length)[0][0] for k in longer]
+            there = np.isfinite(steps)
+            off += np.where(there, steps, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+            found[sizes == length, 0] += off
+            length //= 2
+        return found
+
+    def error(self, row: int, direction: Array) -> float:
+        """Standard error of a design in a direction of the objectives; infinite of one that failed."""
+        shifts = self.of(row, self.made[row].shape[2])[1][: len(direction)]
+        return float(np.nan_to_num(spread((direction @ shifts)[None]), nan=np.inf)[0])
+
+    def apart(self, row: int, direction: Array) -> Array:
+        """Standard errors of the differences of all simulated designs from one, in a direction, (n,): the same scatter is in
+        both, but less so the more they differ, which no model of the values sees."""
+        sizes = [one.shape[2] for one in self.made if one.size]
+        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points in common
+        shifts = np.array([self.of(k, n)[1] - self.of(row, n)[1] for k, n in both])
+        own = shifts[:, : len(direction)]
+        return np.nan_to_num(spread(np.einsum("knr,n->kr", own, direction)))
+
+    def of(self, row: int, length: int) -> Asked:
+        """A design by so many points of each replicate, less what the surrogate says that more points would change."""
+        found, shifts = self._asked(row, length)
+        if not self._guesses:
+            return found, shifts
+        slopes, guess = self._explained(), partial(self._asked, row, guessed=True)
+        (few, its), (many, their) = guess(length), guess(self._guesses.length)
+        left = shifts - slopes[:, None] * (its - their)
+        own = spread(shifts)
+        part = np.where(own > 0.0, spread(left) / np.where(own > 0.0, own, 1.0), 1.0)
+        return np.array([found[0] - slopes * (few - many)[0], found[1] * part]), left
+
+    def _explained(self) -> Array:
+        """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
+        rows, first = (
+            [k for k, one in enumerate(self.made) if one.size],
+            first_length(self._run.study),
+        )
+        if self._slopes[0] != len(rows):
+            ours, theirs = (
+                np.nan_to_num([self._asked(k, first, guessed)[1] for k in rows])
+                for guessed in (False, True)
+            )
+            squares = (theirs**2).sum(axis=(0, 2))
+            both = (ours * theirs).sum(axis=(0, 2))
+            slopes = np.where(squares > 0.0, both / np.where(squares > 0.0, squares, 1.0), 0.0)
+            self._slopes = len(rows), slopes
+        return self._slopes[1]
+
+    def _asked(self, row: int, length: int, guessed: bool = False) -> Asked:
+        """A design by so many points of each replicate, simulated or by the surrogate."""
+        kept, choice = self._at[guessed], self.choices[row]
+        if (row, length) not in kept:
+            if guessed and row not in self._guessed:
+                self._guessed[row] = self._guesses.of(choice, self._guesses.length)
+            made = (self._guessed if guessed else self.made)[row][..., :length]
+            values = [
+                goals.goal_value(goal, made, choice.design, 0.95) for goal in self._case.goals
+            ]
+            rows = [(one.value, float(spread(one.shifts[None])[0]), one.shifts) for one in values]
+            rows += [excess_of(goal, made, choice.design) for goal in self._case.kept]
+            kept[row, length] = (
+                np.array([one[:2] for one in rows]).T, np.array([one[2] for one in rows]),
+            )  # fmt: skip
+        return kept[row, length]
