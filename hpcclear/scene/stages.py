@@ -215,7 +215,7 @@ class Verification(Table):
     """Number of designs of a case in each round."""
     infill_samples: Annotated[int, Count(REPLICATES * 2, 10**9)] = 512
     """Largest number of simulations of each of these designs in the search, by randomised Sobol sequences; at most
-    `samples` if that is given. A design begins with a quarter of them, 64 at most; only contenders get more."""
+    `samples` if that is given. A design begins with 32; only contenders get more."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Clearance of all joints in the compared responses, m; default the clearances of scene and design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2

@@ -11,8 +11,8 @@ from hpcclear.study.optimisation import chosen_in_all
 WIDE = 4
 """Designs per design variable all over the box at first."""
 
-FIRST = 4
-"""Points of each replicate that a design gets at first, or a quarter of what it may have."""
+FIRST = 2
+"""Points of each replicate that a design gets at first: what the surrogate explains of their scatter needs no more."""
 
 HEDGES = 3
 """Designs to verify that only may be the best, since what is believed of neighbours is off together."""
@@ -36,17 +36,12 @@ def simulations(study: Study) -> tuple[int, int]:
     first = sum(chosen_in_all(study)) + sum(all_over(study, case) for case in study.cases)
     settings, most = study.verification, truth.search_length(study) * REPLICATES
     further = settings.infill_rounds * settings.infill_designs * len(study.cases) * most
-    further += first * (most - first_length(study) * REPLICATES)
+    further += first * (most - FIRST * REPLICATES)
     failures = sum(len(failures_of(study, case)) for case in study.cases)
     designs = settings.infill_rounds * settings.infill_designs
     draws = importance.LEVELS * PILOT + (designs * FEW + SETTLED * SURE) * importance.REPEATS
     settled = sum(SETTLED for case in study.cases if any(not one.exact for one in case.kept))
-    return first * first_length(study) * REPLICATES, further + settled * most + failures * draws
-
-
-def first_length(study: Study) -> int:
-    """Points of each replicate that a design gets at first: a power of two."""
-    return min(max(truth.search_length(study) // 4, 2), FIRST)
+    return first * FIRST * REPLICATES, further + settled * most + failures * draws
 
 
 def all_over(study: Study, case: Case) -> int:

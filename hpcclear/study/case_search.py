@@ -22,7 +22,7 @@ from hpcclear.statistics.search.improvement import NEAR, Beliefs, Known, Space
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import contest, goals, truth
-from hpcclear.study.budget import AIM, AIMS, HEDGES, OFF, SETTLED, SURE, all_over, first_length
+from hpcclear.study.budget import AIM, AIMS, FIRST, HEDGES, OFF, SETTLED, SURE, all_over
 from hpcclear.study.failures import CLEAR, CLOSE, FEW, Failures
 from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice, choices, distinct
@@ -123,7 +123,7 @@ class CaseSearch:
                 self._hope = worth / size
             least = (FRONT if turn else WORTH) * size
             row, again = self._contender(beliefs, direction, rows)
-            new = worth / first_length(self._run.study)
+            new = worth / FIRST
             if again > new and again * self.designs.made[row].shape[2] > least:
                 rows.append(row)
             elif worth > (least or self._least):
@@ -149,7 +149,7 @@ class CaseSearch:
         main = self._space.directions[0]
         merit = np.where(beliefs.finite, beliefs.believed @ main, np.inf)
         merit = np.where(beliefs.allowed | ~beliefs.allowed.any(), merit, np.inf)
-        first = self.designs.sizes.max() == first_length(self._run.study)
+        first = self.designs.sizes.max() == FIRST
         rows = np.argsort(merit, kind="stable")[: LEADERS if first else 1]
         size = KNOWN * self._accuracy(beliefs, main)
         return [
@@ -228,13 +228,21 @@ class CaseSearch:
             row = int(apart.argmin())
             if apart[row] > NEAR:
                 (row,) = self.designs.add(point[None])
-            while self.designs.made[row].shape[2] < self._size:
+            while self._unclear(row):
                 lengthened(self._run, [(self, [row])])
             if self._failures.densities:
                 self._failures.draw(self.designs.choices, [row], SURE)
             guess, _ = beliefs.shortfalls(point[None], np.zeros(len(self._case.kept)))
             if (abs(self._known().excess[row] - guess[0]) < self._agree).all():
                 return
+
+    def _unclear(self, row: int) -> bool:
+        """Whether more simulations of a design would tell how far it keeps its constraints."""
+        length = self.designs.made[row].shape[2]
+        if not length:
+            return True
+        errors = self.designs.of(row, length)[0][1, len(self._case.goals) :]
+        return length < self._size and bool((errors > np.array(self._agree) / 2.0).any())
 
     # -- the end -------------------------------------------------------------------------------------
 
@@ -326,7 +334,7 @@ def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -
     made = [one.made[row] for one, row in where]
     for length in sorted({one.shape[2] for one in made}):
         rows = [k for k, one in enumerate(made) if one.shape[2] == length]
-        more = length or first_length(run.study)
+        more = length or FIRST
         truth.lengthen(run, chosen, made, rows, "search", "search", more)
     for (one, row), values in zip(where, made, strict=True):
         one.made[row] = values

@@ -14,7 +14,7 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import to_coordinates
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth
-from hpcclear.study.budget import first_length
+from hpcclear.study.budget import FIRST
 from hpcclear.study.failures import excess_of
 from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice, choices
@@ -108,13 +108,10 @@ class Simulated:
 
     def _explained(self) -> Array:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
-        rows, first = (
-            [k for k, one in enumerate(self.made) if one.size],
-            first_length(self._run.study),
-        )
+        rows = [k for k, one in enumerate(self.made) if one.size]
         if self._slopes[0] != len(rows):
             ours, theirs = (
-                np.nan_to_num([self._asked(k, first, guessed)[1] for k in rows])
+                np.nan_to_num([self._asked(k, FIRST, guessed)[1] for k in rows])
                 for guessed in (False, True)
             )
             squares = (theirs**2).sum(axis=(0, 2))
