@@ -1,5 +1,7 @@
 """Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
+from types import SimpleNamespace
+
 import moocore
 import numpy as np
 import opened
@@ -11,8 +13,8 @@ from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Beliefs, Known, Space
 from hpcclear.study import extent
-from hpcclear.study.case_search import CaseSearch
 from hpcclear.study.optimisation import Choice
+from hpcclear.study.simulated import Simulated
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -194,14 +196,30 @@ def test_a_search_ends_at_the_front(done):
     assert samples.sizes["sample"] < sum(counted.values())
 
 
+def simulated(f, length, guesses=()):
+    """Two designs, the second with f half a unit higher and few points."""
+    run = SimpleNamespace(study=study().required_study)
+    choice = Choice("", "robust", {"m2": 0.2, "m3": 0.1})
+    one = Simulated(run, run.study.cases[0], guesses, [choice] * 2)
+    one.made = [np.stack([f, 0.0 * f]), np.stack([f + 0.5, 0.0 * f])[..., :length]]
+    return one
+
+
 def test_designs_are_compared_by_points_that_both_have_met():
     """f of one is that of the other and a constant: their difference is known, however few points one has."""
-    f, case = np.random.default_rng(7).normal(1.0, 0.1, (16, 32)), study().required_study.cases[0]
-    one = object.__new__(CaseSearch)
-    one._case, one._seen = case, {}
-    one.choices = [Choice("", "robust", {"m2": 0.2, "m3": 0.1})] * 2
-    one.made = [np.stack([f, 0.0 * f]), np.stack([f + 0.5, 0.0 * f])[..., :4]]
-    np.testing.assert_allclose(one._apart(0, np.array([1.0, 0.0])), 0.0, atol=1e-12)
+    f = np.random.default_rng(7).normal(1.0, 0.1, (16, 32))
+    np.testing.assert_allclose(simulated(f, 4).apart(0, np.array([1.0, 0.0])), 0.0, atol=1e-12)
+
+
+def test_scatter_that_the_surrogate_explains_needs_no_simulations():
+    """f is the surrogate's and a constant: few points tell what all would."""
+    f = np.random.default_rng(8).normal(1.0, 0.1, (16, 256))
+    guesses = SimpleNamespace(of=lambda choice, length: np.stack([f, 0.0 * f]), length=256)
+    (few, errors), (all_, _) = simulated(f, 2, guesses).of(1, 2)[0], simulated(f, 256).of(1, 256)[0]
+    np.testing.assert_allclose(few, all_, rtol=1e-9)
+    assert (
+        errors[0] < 0.2 * simulated(f, 2).of(1, 2)[0][1, 0]
+    )  # those of the surrogate's own points
 
 
 @pytest.mark.nightly

@@ -37,9 +37,11 @@ WORTH, FRONT, AREA, PATIENCE = 0.3, 1.0, 0.01, 1
 directions, and of the area below a front of two objectives, with more a fifth of that of the distance to it; rounds in a row
 that are not, after which the search ends."""
 
-LEADERS, KNOWN, AWAY = 3, 0.25, 0.05
-"""Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do; how far
-`HEDGES` are off others, over the ranges."""
+LEADERS, KNOWN = 3, 0.25
+"""Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do."""
+
+AWAY, BOLD = 0.05, 2.0
+"""How far `HEDGES` are off others, over the ranges; standard errors by which they may be better than is believed."""
 
 SMALL, SHOWN = 0.012, 3.0
 """Of the same for other statistics than probabilities: 0.24 % below the threshold is sought; and standard errors after the most
@@ -267,12 +269,12 @@ class CaseSearch:
             front = np.flatnonzero(moocore.is_nondominated(means))
             rows += kept[front[cut(means[front], max(designs, means.shape[1]))]].tolist()
         rows = list(dict.fromkeys(rows))
-        bold = (
-            beliefs.believed @ main
-            - np.sqrt(beliefs.variances(known) @ main**2)
-            - self._apart(rows[0], main)
-        )
+        merit = beliefs.believed @ main
+        spreads = np.sqrt(beliefs.variances(known) @ main**2) + self._apart(rows[0], main)
+        bold = merit - BOLD * spreads
         for row in kept[np.argsort(bold[kept], kind="stable")]:
+            if bold[row] > merit[rows[0]]:
+                break
             apart = abs(known[rows] - known[row]) / np.ptp(self._space.bounds, axis=1)
             if len(rows) < len(self._space.directions) + HEDGES and apart.max(axis=1).min() > AWAY:
                 rows.append(int(row))
