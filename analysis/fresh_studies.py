@@ -26,6 +26,7 @@ from closed_forms import DESIGN, PATHS, Judge, dynamics, form_of, random_inputs,
 from regret import carried_out
 from scipy.optimize import differential_evolution
 
+from hpcclear.base.student import student
 from hpcclear.base.verdict import Verdict
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
@@ -44,11 +45,14 @@ OBJECTIVES = (
     ["deviation"],
     [{"formula": "0 - m2 - m3"}, "mean"],
 )
-SCANNED, JUDGED, WEIGHTED = 4096, 65536, 40_000
+SCANNED, JUDGED, WEIGHTED = 4096, 2**19, 40_000
 FIELDS = (
     "seed", "kind", "objective", "constraint", "regret", "kept", "false", "share", "simulations", "forecast", "seconds",
-    "inside", "intervals",
+    "inside", "intervals", "far",
 )  # fmt: skip
+EXACT = (15 / 13) ** 0.5 / student(0.95, 15)
+"""Root mean square of what an exact interval of 16 replicates is off the truth, over its half-width."""
+
 VERIFICATION = {"designs": 4, "most_samples": 8192, "infill_rounds": 4}
 ACCURACY = {"mean": 0.002, "deviation": 0.005, "quantile": 0.005}
 
@@ -142,23 +146,24 @@ def judged(seed: int, kinds: Sequence[str] = KINDS) -> dict[str, Any]:
     holds = np.zeros(len(names), bool)
     if case.kept:
         holds = (table["constraint_verdict"].to_numpy() == Verdict.HOLDS).all(axis=1)
-    false = sum(fine.of(row)[1] > 0.02 for row, one in zip(rows, holds, strict=True) if one)
-    inside = intervals = 0
-    for k, row in enumerate(rows):
-        true = fine.of(row)[2]
-        for column, which in zip(true, ("first", "second"), strict=False):
-            if f"{which}_lower" in table and len(case.goals) > ("first", "second").index(which):
+    truths = [fine.of(row) for row in rows]
+    false = sum(its[1] > 0.02 for its, one in zip(truths, holds, strict=True) if one)
+    named, inside = ("mean", "deviation") if case.plain else ("first", "second"), 0
+    far = []  # from the truth, over half-widths
+    for k, (_, _, true) in enumerate(truths):
+        for column, which in zip(true[: len(case.goals)], named, strict=False):
+            if f"{which}_lower" in table:
                 low, high = (float(table[f"{which}_{end}"][k]) for end in ("lower", "upper"))
-                slack = 2e-3 * abs(column)  # of the judge
-                intervals += high > low
-                inside += high > low and low - slack <= column <= high + slack
+                if high > low:
+                    far.append((column - float(table[f"{which}_true"][k])) / (high - low) * 2.0)
+                    inside += low <= column <= high
     return {
         "seed": seed, "kind": kind, "objective": case.goals[0].words("m"),
         "constraint": f"{case.kept[0].words('m')} {case.kept[0].most:.2g}" if case.kept else "",
         "regret": round(float(np.maximum(regret, 0.0)), 5), "kept": int(holds.sum()), "false": int(false),
         "share": round(values[-1] / case.kept[0].most, 3) if case.kept and case.kept[0].limit else "",
         "simulations": count, "forecast": said, "seconds": round(seconds, 1),
-        "inside": inside, "intervals": intervals,
+        "inside": inside, "intervals": len(far), "far": round(float(np.sqrt(np.mean(np.square(far)))), 3) if far else "",
     }  # fmt: skip
 
 
@@ -185,6 +190,12 @@ def main() -> None:
     )
     spent = np.median([row["simulations"] for row in rows])
     kept, false = (sum(row[name] for row in rows) for name in ("kept", "false"))
+    counts, inside = (np.array([row[name] for row in rows]) for name in ("intervals", "inside"))
+    squares = sum(row["intervals"] * row["far"] ** 2 for row in rows if row["intervals"])
+    needed = EXACT / np.sqrt(squares / counts.sum())
+    print(
+        f"{inside.sum()} of {counts.sum()} intervals hold; {needed:.2f} times the width that is needed"
+    )
     print(f"{spent:.0f} simulations in the median; {false} of {kept} designs called kept are not")
 
 
