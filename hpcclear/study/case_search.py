@@ -286,8 +286,11 @@ class CaseSearch:
                 > WORTH * self._accuracy(beliefs, one)
             ]  # fmt: skip
         else:
-            near = np.abs(beliefs.known.excess - beliefs.shortfalls(points[0][None])[0]).max(axis=1)
-            off = beliefs.known.excess_errors[int(np.nanargmin(near))]
+            apart = abs(known - points[0]) / np.ptp(self._space.bounds, axis=1)
+            near = int(np.where(beliefs.finite, apart.max(axis=1), np.inf).argmin())
+            off = np.hypot(
+                beliefs.known.excess_errors[near], beliefs.shortfalls(points[0][None])[1][0]
+            )
             points += [
                 improvement.expected(beliefs, main, margins)
                 for margins in (

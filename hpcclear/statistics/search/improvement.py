@@ -209,11 +209,16 @@ def _trended(
     bounds: Array,
     rng: np.random.Generator,
 ) -> Trended:
+    """A model upon the trend or without it: whichever tells better of each design from all others."""
     guess, known = trend(designs), np.isfinite(values)
     steps = guess[known] - guess[known].mean() if known.any() else guess[known]
     squares = float(steps @ steps)
-    slope = float(steps @ values[known]) / squares if squares > 0.0 else 0.0
-    return Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
+    slopes = [0.0, float(steps @ values[known]) / squares] if squares > 0.0 else [0.0]
+    made = [
+        Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
+        for slope in slopes
+    ]
+    return min(made, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
 
 
 def _fitted(
