@@ -23,7 +23,7 @@ from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import contest, goals, truth
 from hpcclear.study.budget import AIM, AIMS, FIRST, HEDGES, OFF, SETTLED, SURE, all_over
-from hpcclear.study.failures import CLEAR, CLOSE, FEW, Failures
+from hpcclear.study.failures import CLOSE, FEW, Failures
 from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice, choices, distinct
 from hpcclear.study.run import StudyRun
@@ -32,7 +32,7 @@ from hpcclear.study.simulated import Simulated
 PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
-WORTH, FRONT, AREA, PATIENCE = 0.3, 1.0, 0.01, 1
+WORTH, FRONT, AREA, PATIENCE = 0.2, 1.0, 0.01, 1
 """What another design or more simulations are worth at least: of the accuracy requested, in what decides and in other
 directions, and of the area below a front of two objectives, with more a fifth of that of the distance to it; rounds in a row
 that are not, after which the search ends."""
@@ -91,7 +91,7 @@ class CaseSearch:
         self.designs = Simulated(run, case, guesses, distinct([*start, *wide]))
         self._begun = len(self.designs)
         self._failures = Failures(run, case, self._rng)
-        self._near: set[int] = set()
+        self._near, self._again = set[int](), set[int]()
         self._agree = [AGREE[one.statistic != "exceedance"] for one in case.kept]
 
     # -- asking ------------------------------------------------------------------------------------
@@ -138,6 +138,7 @@ class CaseSearch:
             point = max(left, key=lambda one: one[0])[1]
             beliefs.take(point)
             rows += self.designs.add(point[None])
+        self._again = {row for row in rows if self.designs.made[row].size}
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):
             means, _ = beliefs.shortfalls(fresh)
@@ -155,9 +156,9 @@ class CaseSearch:
         rows = np.argsort(merit, kind="stable")[: LEADERS if first else 1]
         size = KNOWN * self._accuracy(beliefs, main)
         return [
-            int(k)
-            for k in rows
-            if self.designs.made[k].shape[2] < self._size and self.designs.error(k, main) > size
+            k
+            for k in rows.tolist()
+            if self._unclear(k) or (self._longer(k) and self.designs.error(k, main) > size)
         ]
 
     def _contender(
@@ -201,20 +202,21 @@ class CaseSearch:
     # -- probabilities -------------------------------------------------------------------------------
 
     def weigh(self) -> None:
-        """Draw weighted samples of designs near a threshold that have none."""
+        """Draw weighted samples of designs near a threshold that have none, and twice as many of those that are asked again."""
         if not self._failures.goals:
             return
         columns = [self._case.kept.index(one) for one in self._failures.goals]
-        now = self._known()
-        excess, errors = (one[:, columns].max(axis=1) for one in (now.excess, now.excess_errors))
+        excess = self._known().excess[:, columns].max(axis=1)
         known = np.flatnonzero(np.isfinite(excess)).tolist()
         if known and not self._failures.densities:
             self._failures.prepare(
                 self.designs.choices[min(known, key=lambda row: abs(excess[row]))]
             )
         near = {row for row in known if abs(excess[row]) < CLOSE} | self._near
-        near = {row for row in near if not errors[row] < CLEAR}
+        again = sorted(near & self._again & set(self._failures.drawn))
         self._failures.draw(self.designs.choices, sorted(near - set(self._failures.drawn)), FEW)
+        for row in again:
+            self._failures.draw(self.designs.choices, [row], self._failures.drawn_of(row))
         self._near = set()
 
     def settle(self) -> None:
@@ -238,13 +240,15 @@ class CaseSearch:
             if (abs(self._known().excess[row] - guess[0]) < self._agree).all():
                 return
 
+    def _longer(self, row: int) -> bool:
+        """Whether a design may have more simulations."""
+        return bool(self.designs.made[row].shape[2] < self._size)
+
     def _unclear(self, row: int) -> bool:
         """Whether more simulations of a design would tell how far it keeps its constraints."""
         length = self.designs.made[row].shape[2]
-        if not length:
-            return True
-        errors = self.designs.of(row, length)[0][1, len(self._case.goals) :]
-        return length < self._size and bool((errors > np.array(self._agree) / 2.0).any())
+        errors = self.designs.of(row, length)[0][1, len(self._case.goals) :] if length else np.inf
+        return self._longer(row) and bool((errors > np.array(self._agree) / 2.0).any())
 
     # -- the end -------------------------------------------------------------------------------------
 

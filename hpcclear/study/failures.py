@@ -27,9 +27,9 @@ from hpcclear.study.run import StudyRun
 PLENTY = 0.2
 """Probability that plain samples show as well as weighted ones."""
 
-CLOSE, CLEAR, FEW, PILOT, ENOUGH = 1.0, 0.1, 8, 256, 4
-"""Indices from the threshold within which designs get weighted draws, unless their standard error is less; these of each
-repeat; draws of each level of their pilot; failures for each random input from which a density is fitted anew."""
+CLOSE, FEW, PILOT, ENOUGH = 1.0, 8, 256, 4
+"""Indices from the threshold within which designs get weighted draws; these of each repeat; draws of each level of their pilot;
+failures for each random input from which a density is fitted anew."""
 
 HITS, FAR, BEYOND = 3, 4.0, 0.1
 """Failures from which on their share is an index, else the largest values are; shortfall of an index beyond which the order
@@ -83,6 +83,11 @@ class Failures:
                 block = WeightedDraws(k, u, np.where(failing, weights, 0.0))
                 self.drawn.setdefault(row, []).append(block)
             self.densities[k] = self._renewed(k)
+
+    def drawn_of(self, row: int) -> int:
+        """Draws of each repeat that a design has for each constraint."""
+        own = self.drawn[row]
+        return sum(len(one.u) for one in own) // (len(self.goals) * importance.REPEATS)
 
     def excess(self, row: int, k: int, value: float, error: float) -> tuple[float, float]:
         """`excess_of` a design by its weighted draws; value and error as they are where none of these fails."""

@@ -102,9 +102,8 @@ class Simulated:
         slopes, guess = self._explained(), partial(self._asked, row, guessed=True)
         (few, its), (many, their) = guess(length), guess(self._guesses.length)
         left = shifts - slopes[:, None] * (its - their)
-        own = spread(shifts)
-        part = np.where(own > 0.0, spread(left) / np.where(own > 0.0, own, 1.0), 1.0)
-        return np.array([found[0] - slopes * (few - many)[0], found[1] * part]), left
+        errors = found[1] + spread(left) - spread(shifts)  # of an index more than replicates show
+        return np.array([found[0] - slopes * (few - many)[0], errors]), left
 
     def _explained(self) -> Array:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
