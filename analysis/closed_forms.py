@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
 
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene, load_scene
@@ -170,7 +171,8 @@ def dynamics(form: Form) -> Iterator[None]:
 
 
 class Judge:
-    """Probabilities of failure by weighted draws of a wide normal density, the same draws for all designs.
+    """Probabilities of failure by weighted draws of a wide normal density, the same draws for all designs; a power of two of
+    them is a scrambled Sobol sequence.
 
     Parameters
     ----------
@@ -183,7 +185,11 @@ class Judge:
     def __init__(self, scene: Scene, form: Form, draws: int, seed: int, wide: float = WIDE) -> None:
         self._scene, self._form = scene, form
         self._random = scene.required_study.cases[0].random
-        u = wide * np.random.default_rng([97, seed]).standard_normal((draws, len(self._random)))
+        rng = np.random.default_rng([97, seed])
+        if draws & (draws - 1):
+            u = wide * rng.standard_normal((draws, len(self._random)))
+        else:  # as a verified mean of smooth f is known better than plain draws tell
+            u = wide * ndtri(qmc.Sobol(len(self._random), rng=rng, bits=60).random(draws))
         chances = list(np.clip(ndtr(u), 1e-16, 1.0 - 1e-16).T)
         self._moved = offsets(scene, self._random, chances, {})
         self._weights = wide ** len(self._random) * np.exp(
