@@ -385,14 +385,12 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
         return plain(column) + 4e-5 * np.exp(-(along**2) - across**2)
 
     monkeypatch.setattr(formula, "objective", hill)
-    told: list[str] = []
     scene = scene_of("study.verification.infill_rounds=4", "study.seed=5")
-    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", notify=told.append)
-    assert any(text.startswith("Surrogate errors of mean") for text in told)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     found = opened.read(tmp_path / "out" / "verification.nc")
     ours, swarms = found.sel(design="first alpha"), found.sel(design="first best alpha")
-    assert float(ours["mean_true"]) < float(swarms["mean_true"])
-    assert swarms["dominated"]  # significantly, by the scatter that both meet
+    assert float(swarms["mean_surrogate"]) < 0.98 * float(swarms["mean_true"])
+    assert float(ours["mean_upper"]) < float(swarms["mean_lower"])
     least = min(
         truth({"m2": m2, "m3": 0.07, "u2": u2, "I2": m2 * 1.2e-3}, False)[0]
         + 4e-5 * np.exp(-(((u2 - 0.12) / 0.04) ** 2))

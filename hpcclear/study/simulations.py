@@ -153,7 +153,8 @@ class Simulations:
         with self._ranks.writing():  # a long fit may follow
             self._checkpoint.flush_when_due()
         self.next += len(points)
-        _refuse_if_all_failed(records, stage)
+        if stage != "search":  # which then looks elsewhere
+            _refuse_if_all_failed(records, stage)
         return records
 
     def objective(self, records: np.ndarray) -> Array:
