@@ -302,7 +302,11 @@ class CaseSearch:
                     *(self._margins(AIM) + errors * off for errors in OFF),
                 )
             ]
-        fresh = choices(self._run, self._case.name, np.reshape(points, (-1, known.shape[1])))
+        taken = known[rows]
+        for point in points:
+            if (abs(taken - point) / np.ptp(self._space.bounds, axis=1)).max(axis=1).min() > NEAR:
+                taken = np.vstack([taken, point])
+        fresh = choices(self._run, self._case.name, taken[len(rows) :])
         return distinct([*(self.designs.choices[row] for row in rows), *fresh])
 
     def _apart(self, row: int, direction: Array) -> Array:

@@ -2,13 +2,16 @@
 
 Each objective and constraint gets one Kriging model over designs, with the kernel of Matern and the known error of each value:
 a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
-probability that it keeps the constraints; more simulations of a known design are worth what they may change in which design is
+probability that it keeps the constraints, and less where its own error hides what is not known yet (augmented expected
+improvement); more simulations of a known design are worth what they may change in which design is
 taken for the best (knowledge gradient). Both are compared by simulation: few for a new design at first, more for
 contenders only ("replication or exploration"). Of several designs at a time each takes those before it for evaluated, at
 the value that is expected (Kriging believer).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
-Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
+Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors D. Huang, T. T. Allen, W. I. Notz and N. Zeng,
+"Global optimization of stochastic black-box systems via sequential kriging meta-models", J. Global Optim. 34 (2006),
+doi:10.1007/s10898-005-2454-3; V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
 kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4;
 M. Binois, J. Huang, R. B. Gramacy and M. Ludkovski, "Replication or exploration? Sequential design for stochastic simulation
 experiments", Technometrics 61 (2019), doi:10.1080/00401706.2018.1469433; the sum over strips M. Emmerich, K. Yang, A. Deutz,
@@ -176,6 +179,12 @@ class Beliefs:
             [nothing if model is None else model.variance(points) for model in self.models]
         )
 
+    @property
+    def noise(self) -> Array:
+        """Variance of the error of one more design's objectives, (m,)."""
+        rests = [None if one is None else one.rest for one in self.models]
+        return np.array([0.0 if one is None else _noise(one) for one in rests])
+
     def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
         """By how much constraints are expected to be broken, margins included, and standard deviations, (n, c) each."""
         margins = self.space.margins if margins is None else margins
@@ -246,6 +255,11 @@ def _fitted(
         noise=limits,
         shares=shares,
     )
+
+
+def _noise(model: Kriging) -> float:
+    share = 1.0 if model.shares is None else float(np.median(model.shares))
+    return float(model.scale**2 * model.noise_variance * share)
 
 
 def _extended(model: Trended, point: Array) -> Trended:
@@ -334,7 +348,9 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
         mean, deviation = beliefs.means(points), np.sqrt(beliefs.variances(points))
         if direction is not None:
             own, spread = mean @ direction, np.sqrt(deviation**2 @ direction**2)
-            won = gain((front @ direction).min(), own, spread)
+            error = np.sqrt(beliefs.noise @ direction**2)
+            told = 1.0 - error / np.sqrt(spread**2 + error**2 + 1e-300)
+            won = gain((front @ direction).min(), own, spread) * told
         elif front.shape[1] == 2:
             won = volume(front, mean, deviation)
         else:
