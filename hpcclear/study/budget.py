@@ -21,7 +21,7 @@ AIM, AIMS = 0.8, (0.88, 0.78, 0.65)
 """Probability that is sought, over the largest that is allowed: so much below it can be shown; and of the designs that are
 verified, of which one nearer to the threshold may stay undecided."""
 
-OFF = 1.0, 2.0
+OFF = 1.0, 2.0, 4.0
 """Standard errors of the constraints by which further designs keep them: all designs meet the same scatter, so that what few
 simulations get wrong they get wrong of all, and designs along the threshold break or keep it together."""
 

@@ -32,7 +32,7 @@ from hpcclear.study.simulated import Simulated
 PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
-WORTH, FRONT, AREA, PATIENCE = 0.2, 1.0, 0.01, 1
+WORTH, FRONT, AREA, PATIENCE = 0.2, 1.0, 0.01, 2
 """What another design or more simulations are worth at least: of the accuracy requested, in what decides and in other
 directions, and of the area below a front of two objectives, with more a fifth of that of the distance to it; rounds in a row
 that are not, after which the search ends."""
@@ -134,10 +134,12 @@ class CaseSearch:
             elif worth > 0.0:
                 left.append((worth / (least or self._least), point))
         self._idle = self._idle + 1 if len(left) == count else 0
-        if self._idle and left:  # the models may be wrong
+        if self._idle and left:  # the models may be wrong: there, and where nothing is known
             point = max(left, key=lambda one: one[0])[1]
-            beliefs.take(point)
-            rows += self.designs.add(point[None])
+            for _ in range(count):
+                beliefs.take(point)
+                rows += self.designs.add(point[None])
+                point = improvement.farthest(beliefs)[0]
         self._again = {row for row in rows if self.designs.made[row].size}
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):

@@ -46,7 +46,7 @@ FALL = 0.5, 1.5
 """Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f. The mean shows it
 first: the error of a standard deviation by few points falls alike whether f is rough or smooth."""
 
-SPENT = 0.03, 0.1, 0.08
+SPENT = 0.04, 0.1, 0.12
 """Part of what a search may simulate beyond its first designs: of smooth f; more where a design takes all simulations that it
 may have; and more where it has to keep constraints."""
 
