@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from dense_mechanism import Touch, touching
+from rigid_slider import CORNERS
 from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage import parts as m
@@ -62,14 +63,6 @@ def sine(x, shift=0.0):
 def turned(vector, angle):
     c, s = sine(angle, math.pi / 2), sine(angle)
     return [vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c]
-
-
-CORNERS = {
-    "front_left": (1, 1),
-    "front_right": (1, -1),
-    "back_left": (-1, 1),
-    "back_right": (-1, -1),
-}
 
 
 @dataclass

@@ -79,7 +79,8 @@ def workbook(made, random=None):
     return stream.getvalue()
 
 
-def _pairs(pairs, unit):
+def drawn(pairs, unit=4, end="\n"):
+    """A drawing by its pairs of code and value."""
     head = [
         (0, "SECTION"),
         (2, "HEADER"),
@@ -90,7 +91,7 @@ def _pairs(pairs, unit):
         (2, "ENTITIES"),
     ]
     every = [*head, *pairs, (0, "ENDSEC"), (0, "EOF")]
-    return "".join(f"{code:3d}\n{value}\n" for code, value in every).encode()
+    return "".join(f"{code:3d}{end}{value}{end}" for code, value in every)
 
 
 def drawing(made, random=None):
@@ -102,7 +103,7 @@ def drawing(made, random=None):
     for body, own in made.bodies.items():
         pairs += [(0, "LWPOLYLINE"), (8, body), (90, len(own)), (70, int(len(own) > 2))]
         pairs += [pair for p in own for pair in zip((10, 20), made.points[p], strict=True)]
-    return _pairs(pairs, 4)
+    return drawn(pairs).encode()
 
 
 def sketch(made, random=None):

@@ -130,6 +130,18 @@ def test_ten_separate_impacts_converge_to_those_of_rigid_bodies(published, monke
 
 
 # ---- random linkages against the dense model ---------------------------------------------------------
+LAWS = {
+    "effects": {
+        "gravity": GRAVITY, "contact": {"law": "hunt-crossley", "damping": CHI},
+        "friction": {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP},
+    },
+    "numerics": {
+        "rtol": 1e-11, "method": "dormand-prince", "transient_revolutions": 0, "averaged_revolutions": 1,
+    },
+    "output": {"instants_per_revolution": 2000},
+}  # fmt: skip
+
+
 def on_the_ground(rng):
     """A slider-crank askew, its guide with clearance."""
     bodies = {
@@ -183,25 +195,15 @@ def random_scene(seed):
                 "kind": "planar", "bodies": bodies, "joints": joints, "ground": {"points": ground},
                 "drives": {"motor": drive},
             },
-            "effects": {
-                "gravity": GRAVITY, "contact": {"law": "hunt-crossley", "damping": CHI},
-                "friction": {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP},
-            },
-            "numerics": {
-                "rtol": 1e-11, "method": "dormand-prince", "transient_revolutions": 0,
-                "averaged_revolutions": 1,
-            },
-            "output": {"instants_per_revolution": 2000},
+            **LAWS,
         }
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(k, marks=[] if k == 1 else pytest.mark.full) for k in range(20)]
-)
-def test_random_guides_move_as_in_the_dense_model(seed):
-    """To 1e-8 m from the start through the first contact, and some time after, while the motion is regular."""
-    scene = random_scene(seed)
+def dense_through_contact(scene, last):
+    """Positions are those of the dense model to 1e-8 m from the start through the first contact, and 1 ms after it, while
+    the motion is regular, at most until `last` (s); the response, and at which instants so compared something is pressed.
+    """
     mechanism = linkage_of(scene).mechanism
     laws = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
     dense = Dense(mechanism, [laws], GRAVITY)
@@ -209,9 +211,16 @@ def test_random_guides_move_as_in_the_dense_model(seed):
     response = simulate(scene)
     time = response["time"].to_numpy()
     pressed = response["contact_force"].to_numpy().max(axis=1) > 1.0
-    end = min(time[pressed.argmax()] + 1e-3, 6e-3)
-    met = comes_as(response, dense, start, end)
-    assert pressed[:met].any()
+    met = comes_as(response, dense, start, min(time[pressed.argmax()] + 1e-3, last))
+    return response, pressed[:met]
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=[] if k == 1 else pytest.mark.full) for k in range(20)]
+)
+def test_random_guides_move_as_in_the_dense_model(seed):
+    response, pressed = dense_through_contact(random_scene(seed), 6e-3)
+    assert pressed.any()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
 

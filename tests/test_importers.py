@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from import_files import DIGITS, digits
+from import_files import DIGITS, digits, drawn
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
@@ -109,19 +109,8 @@ RAM_BARS = [[0, 1, 2], [3], [4], [5, 6], [1, 6]]
 
 def dxf(entities, unit=4, end="\n"):
     """A drawing: entities as (kind, layer, pairs of code and value)."""
-    pairs = [
-        (0, "SECTION"),
-        (2, "HEADER"),
-        (9, "$INSUNITS"),
-        (70, unit),
-        (0, "ENDSEC"),
-        (0, "SECTION"),
-        (2, "ENTITIES"),
-    ]
-    for kind, layer, own in entities:
-        pairs += [(0, kind), (8, layer), *own]
-    pairs += [(0, "ENDSEC"), (0, "EOF")]
-    return end.join(f"{code:3d}{end}{value}" for code, value in pairs) + end
+    pairs = [pair for kind, layer, own in entities for pair in ((0, kind), (8, layer), *own)]
+    return drawn(pairs, unit, end)
 
 
 def at(*places):

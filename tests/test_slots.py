@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_linkage import Contact, Dense, comes_as, start_of
-from test_guides import CHI, GRAVITY, MU, RAMP
+from test_guides import GRAVITY, LAWS, dense_through_contact
 from test_loads import machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.parameters import joint_numbers
 from hpcclear.scene.points import Numbers
 
@@ -130,14 +128,7 @@ def random_lever(seed):
                 "kind": "planar", "bodies": bodies, "joints": joints, "drives": {"motor": drive},
                 "ground": {"points": {"o": [0.0, 0.0], "p": [u(-0.01, 0.01), -0.1]}},
             },
-            "effects": {
-                "gravity": GRAVITY, "contact": {"law": "hunt-crossley", "damping": CHI},
-                "friction": {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP},
-            },
-            "numerics": {
-                "rtol": 1e-11, "method": "dormand-prince", "transient_revolutions": 0, "averaged_revolutions": 1,
-            },
-            "output": {"instants_per_revolution": 2000},
+            **LAWS,
         }
     )  # fmt: skip
 
@@ -146,17 +137,8 @@ def random_lever(seed):
     "seed", [pytest.param(k, marks=[] if k < 2 else pytest.mark.full) for k in range(20)]
 )
 def test_random_slots_move_as_in_the_dense_model(seed):
-    """To 1e-8 m from the start through the first contact, and some time after, while the motion is regular."""
-    scene = random_lever(seed)
-    mechanism = linkage_of(scene).mechanism
-    laws = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
-    dense = Dense(mechanism, [laws], GRAVITY)
-    start = start_of(dense)
-    response = simulate(scene)
-    time = response["time"].to_numpy()
-    pressed = response["contact_force"].to_numpy().max(axis=1) > 1.0
+    response, pressed = dense_through_contact(random_lever(seed), 1e-2)
     assert pressed.any()
-    comes_as(response, dense, start, min(time[pressed.argmax()] + 1e-3, 1e-2))
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     kinetic = float(response["kinetic_energy"].max())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * max(work, kinetic)
