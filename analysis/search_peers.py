@@ -3,7 +3,7 @@
     python analysis/search_peers.py OUT            # ten studies, one after the other; writes results/search_peers.csv
     python analysis/search_peers.py OUT --workers 2
 
-The studies are those of `analysis/fresh_studies.py` from seed 1400 on; bounded probabilities below `RAREST` are left out, since
+The studies are those of `analysis/fresh_studies.py` from seed 1480 on; bounded probabilities below `RAREST` are left out, since
 `DRAWS` plain draws a design do not see such failures. Each study is carried out once. Each peer runs with several seeds until
 the median of their regrets is at most the study's plus `EQUAL`, the resolution of the judge; the least of `BUDGETS` at which
 that is so counts. Of the package `reached` is the same: what its search takes with the least of `ROUNDS` by which its regret is
@@ -52,7 +52,7 @@ from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 
 RESULTS = Path(__file__).parent / "results" / "search_peers.csv"
-FIRST, STUDIES, RAREST, ROUNDS = 1400, 10, 1e-2, (1, 2)
+FIRST, STUDIES, RAREST, ROUNDS = 1480, 10, 1e-2, (1, 2)
 DRAWS, BUDGETS, SEEDS, SLOW = 64, (1600, 3200, 6400, 12800, 25600, 51200), (1, 2, 3), 3200
 EQUAL, SURE, ABOVE = 5e-4, 0.9, 1e-3
 SEARCH = "kriging", "kriging check", "search"

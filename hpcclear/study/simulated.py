@@ -43,6 +43,7 @@ class Simulated:
         self._at = {False: dict[tuple[int, int], Asked](), True: dict[tuple[int, int], Asked]()}
         self._guessed: dict[int, Array] = {}
         self._slopes: tuple[int, Array] = 0, np.zeros(0)
+        self._parts: dict[int, tuple[int, Array]] = {}
 
     def __len__(self) -> int:
         return len(self.choices)
@@ -102,8 +103,22 @@ class Simulated:
         slopes, guess = self._explained(), partial(self._asked, row, guessed=True)
         (few, its), (many, their) = guess(length), guess(self._guesses.length)
         left = shifts - slopes[:, None] * (its - their)
-        errors = found[1] + spread(left) - spread(shifts)  # of an index more than replicates show
+        errors = found[1] - (1.0 - self._left(length, slopes)) * spread(shifts)
         return np.array([found[0] - slopes * (few - many)[0], errors]), left
+
+    def _left(self, length: int, slopes: Array) -> Array:
+        """Part of the errors by so many points that the surrogate does not explain, over all designs, (k,): the replicates of
+        one design do not show it, since few points tell little of a percentile."""
+        rows = [k for k, size in enumerate(self.sizes) if size >= length]
+        if self._parts.get(length, (0, slopes))[0] != len(rows):
+            ours, its, their = (
+                np.nan_to_num([self._asked(k, *which)[1] for k in rows])
+                for which in ((length,), (length, True), (self._guesses.length, True))
+            )
+            left = ((ours - slopes[:, None] * (its - their)) ** 2).sum(axis=(0, 2))
+            own = (ours**2).sum(axis=(0, 2))
+            self._parts[length] = len(rows), np.sqrt(left / np.where(own > 0.0, own, np.inf))
+        return self._parts[length][1]
 
     def _explained(self) -> Array:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
