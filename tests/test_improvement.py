@@ -11,7 +11,7 @@ from formula_study import contents, formula, on_ranks, scene_of
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
-from hpcclear.statistics.search.improvement import Beliefs, Known, Space
+from hpcclear.statistics.search.beliefs import Beliefs, Known, Space
 from hpcclear.study import extent
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.simulated import Simulated

@@ -18,7 +18,8 @@ from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search import improvement
-from hpcclear.statistics.search.improvement import NEAR, Beliefs, Known, Space
+from hpcclear.statistics.search.beliefs import Beliefs, Known, Space
+from hpcclear.statistics.search.improvement import NEAR
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import contest, goals, truth

@@ -38,7 +38,7 @@ _COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
 
 
 @dataclass(frozen=True)
-class Reading:
+class Interpretation:
     """One way to read the text."""
 
     restitution: float
@@ -80,12 +80,12 @@ def simulations(scene: Scene) -> tuple[int, int]:
     return designs * each * (len(made) - over_steps), designs * (STEP_SAMPLES + 1) * over_steps
 
 
-def readings(scene: Scene) -> list[Reading]:
+def readings(scene: Scene) -> list[Interpretation]:
     """All combinations over time, and the scene's own over solver steps."""
     own = scene.number("effects.contact.restitution")
     restitutions = [own] if own == OTHER_RESTITUTION else [own, OTHER_RESTITUTION]
     combinations = itertools.product(restitutions, (True, False), (True, False))
-    return [*(Reading(*one) for one in combinations), Reading(own, True, True, True)]
+    return [*(Interpretation(*one) for one in combinations), Interpretation(own, True, True, True)]
 
 
 def evaluate(run: StudyRun) -> Result:
@@ -120,7 +120,7 @@ def write(run: StudyRun, result: Result) -> None:
     run.write(dataset.dataset("readings", coords, data))
 
 
-def _row(run: StudyRun, reading: Reading) -> dict[str, Array]:
+def _row(run: StudyRun, reading: Interpretation) -> dict[str, Array]:
     """Moments and f at the smallest clearance of all printed designs in one reading."""
     designs = printed_designs(run.scene)
     found = (_over_steps if reading.over_steps else _over_time)(run, reading, designs)
@@ -128,7 +128,7 @@ def _row(run: StudyRun, reading: Reading) -> dict[str, Array]:
 
 
 def _over_time(
-    run: StudyRun, reading: Reading, designs: Sequence[Choice]
+    run: StudyRun, reading: Interpretation, designs: Sequence[Choice]
 ) -> list[tuple[float, ...]]:
     """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
     length = scrambled_length(run.study.verification.audit_samples)
@@ -154,7 +154,7 @@ def _over_time(
 
 
 def _over_steps(
-    run: StudyRun, reading: Reading, designs: Sequence[Choice]
+    run: StudyRun, reading: Interpretation, designs: Sequence[Choice]
 ) -> list[tuple[float, ...]]:
     """The same, a response each."""
     rows = [
@@ -214,11 +214,11 @@ def _clearance(run: StudyRun) -> str:
     return own_names(run.scene)["C"]
 
 
-def _scene(run: StudyRun, reading: Reading) -> Scene:
+def _scene(run: StudyRun, reading: Interpretation) -> Scene:
     return run.scene.with_({"study": None, "effects.contact.restitution": reading.restitution})
 
 
-def _read(run: StudyRun, reading: Reading, points: Points) -> Points:
+def _read(run: StudyRun, reading: Interpretation, points: Points) -> Points:
     """Samples with the further columns that a reading moves."""
     clearance = points.column(_clearance(run))
     built = {joint: run.scene.number(f"joints.{joint}.bearing_radius") for joint in JOINTS}

@@ -1,0 +1,246 @@
+"""Models of objectives and constraints over designs that were evaluated with errors, and of a trend that a cheaper model has.
+
+Sources: J. Sacks et al., "Design and analysis of computer experiments", Statistical Science 4 (1989),
+doi:10.1214/ss/1177012413; of a trend M. C. Kennedy and A. O'Hagan, "Predicting the output from a complex computer code when
+fast approximations are available", Biometrika 87 (2000), doi:10.1093/biomet/87.1.1.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtr
+
+from hpcclear.base.arrays import Array
+from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.kernels import MATERN
+from hpcclear.statistics.surrogate.kriging import Kriging
+
+NOISE = 1e-3, 2.0
+"""Between these factors on the variance of known errors is the noise variance of a model. Designs that meet the same scatter
+share most of their errors, which then are no noise between them."""
+
+LENGTHS = (0.1, 3.0)
+"""Length scales in the unit cube: a statistic that changes faster is not found by some ten designs per variable."""
+
+LIKELY = 0.5
+"""Probability of keeping the constraints from which a design may be the best."""
+
+Exact = Callable[[Array], Array]
+Snap = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Known:
+    """What was evaluated.
+
+    Attributes
+    ----------
+    designs : array, shape (n, d)
+    values, errors : array, shape (n, m)
+        Objectives, all minimised, NaN where they failed; their standard errors.
+    excess, excess_errors : array, shape (n, c)
+        By how much each constraint is broken, at most 0 where it is kept; standard errors.
+    """
+
+    designs: Array
+    values: Array
+    errors: Array
+    excess: Array
+    excess_errors: Array
+
+
+@dataclass(frozen=True)
+class Space:
+    """Where designs are.
+
+    Attributes
+    ----------
+    bounds : array, shape (d, 2)
+    directions : array, shape (k, m)
+        Weights of the objectives in each sum whose least value counts; the first is what counts most.
+    exact : sequence of functions or None, length m
+        Objectives that are known as functions of designs, (n, d) to (n,).
+    margins : array, shape (c,)
+        By how much each constraint is to be kept at least, so that it can be shown.
+    snap : function
+        Designs (n, d) to the nearest ones that there are: values from a catalogue, say.
+    trends : sequence of functions, length m + c
+        What a cheaper model says of objectives, then of constraints, of designs (n, d) to (n,); empty without one.
+    """
+
+    bounds: Array
+    directions: Array
+    exact: Sequence[Exact | None]
+    margins: Array
+    snap: Snap = lambda designs: designs
+    trends: Sequence[Exact] = ()
+
+
+@dataclass(frozen=True)
+class Trended:
+    """A Kriging model of what a multiple of a trend leaves."""
+
+    rest: Kriging
+    slope: float
+    trend: Exact
+
+    def predict(self, points: Array) -> Array:
+        """What is expected at points, (n, d) to (n,)."""
+        return self.rest.predict(points) + self.slope * self.trend(points)
+
+    def variance(self, points: Array) -> Array:
+        """What is not known of it, (n, d) to (n,)."""
+        return self.rest.variance(points)
+
+
+def _flat(points: Array) -> Array:
+    return np.zeros(len(points))
+
+
+class Beliefs:
+    """Models of all objectives and constraints over designs.
+
+    Attributes
+    ----------
+    believed : array, shape (n, m)
+        Objectives of the designs that were evaluated.
+    allowed : array, shape (n,)
+        Which of them are likely to keep the constraints.
+
+    Raises
+    ------
+    InputError
+        Fewer than d + 3 finite values.
+    """
+
+    def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
+        self.known, self.space, self.rng = known, space, rng
+        count = len(space.exact)
+        trends = space.trends or [_flat] * (count + known.excess.shape[1])
+        self.models = [
+            None if exact else _trended(known.designs, values, errors, trend, space.bounds, rng)
+            for values, errors, exact, trend in zip(
+                known.values.T, known.errors.T, space.exact, trends[:count], strict=True
+            )
+        ]
+        self.limits = [
+            _trended(known.designs, values, errors, trend, space.bounds, rng)
+            for values, errors, trend in zip(
+                known.excess.T, known.excess_errors.T, trends[count:], strict=True
+            )
+        ]
+        self.pending = known.designs[:0]
+        self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
+        self.believed = self.means(known.designs)
+        self.allowed = self.finite & (self.feasible(known.designs) >= LIKELY)
+
+    def means(self, points: Array) -> Array:
+        """What is expected at points, (n, d) to (n, m)."""
+        pairs = zip(self.models, self.space.exact, strict=True)
+        return np.column_stack(
+            [exact(points) if exact else model.predict(points) for model, exact in pairs]  # type: ignore[union-attr]
+        )
+
+    def variances(self, points: Array) -> Array:
+        """What is not known of it, (n, d) to (n, m)."""
+        nothing = np.zeros(len(points))
+        return np.column_stack(
+            [nothing if model is None else model.variance(points) for model in self.models]
+        )
+
+    @property
+    def noise(self) -> Array:
+        """Variance of the error of one more design's objectives, (m,)."""
+        rests = [None if one is None else one.rest for one in self.models]
+        return np.array([0.0 if one is None else _noise(one) for one in rests])
+
+    def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
+        """By how much constraints are expected to be broken, margins included, and standard deviations, (n, c) each."""
+        margins = self.space.margins if margins is None else margins
+        none = np.empty((len(points), 0))
+        means = [one.predict(points)[:, None] for one in self.limits]
+        spreads = [np.sqrt(one.variance(points))[:, None] for one in self.limits]
+        return np.hstack([none, *means]) + margins, np.hstack([none, *spreads]) + 1e-12
+
+    def feasible(self, points: Array) -> Array:
+        """Probability of keeping the constraints, (n, d) to (n,)."""
+        means, spreads = self.shortfalls(points)
+        return np.asarray(ndtr(-means / spreads).prod(axis=1))
+
+    def take(self, point: Array) -> None:
+        """A design as if it were evaluated, at what is expected of it."""
+        self.models = [None if one is None else _extended(one, point) for one in self.models]
+        self.limits = [_extended(one, point) for one in self.limits]
+        self.pending = np.vstack([self.pending, point])
+
+    def front(self) -> Array:
+        """Objectives of all designs that are likely to keep the constraints, also of those that are to be evaluated, (k, m)."""
+        later = self.pending[self.feasible(self.pending) >= LIKELY]
+        return np.vstack([self.believed[self.allowed], self.means(later)])
+
+
+def _trended(
+    designs: Array,
+    values: Array,
+    errors: Array,
+    trend: Exact,
+    bounds: Array,
+    rng: np.random.Generator,
+) -> Trended:
+    """A model upon the trend or without it: whichever tells better of each design from all others."""
+    guess, known = trend(designs), np.isfinite(values)
+    steps = guess[known] - guess[known].mean() if known.any() else guess[known]
+    squares = float(steps @ steps)
+    slopes = [0.0, float(steps @ values[known]) / squares] if squares > 0.0 else [0.0]
+    made = [
+        Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
+        for slope in slopes
+    ]
+    return min(made, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
+
+
+def _fitted(
+    designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
+) -> Kriging:
+    known = np.isfinite(values)
+    size = float(np.std(values[known])) if known.any() else 0.0
+    with np.errstate(invalid="ignore"):
+        squares = np.where(errors > 0.0, errors, np.nan)[known] ** 2
+    if not (size > 0.0 and np.isfinite(squares).any()):
+        return fit_kriging(designs, values, bounds, rng=rng, restarts=1, kernel=MATERN)
+    middle = float(np.nanmedian(squares))
+    shares = np.ones(len(values))
+    shares[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
+    low, high = (max(factor * middle / size**2, 1e-8) for factor in NOISE)
+    limits = low, max(high, 10.0 * low)
+    return fit_kriging(
+        designs,
+        values,
+        bounds,
+        rng=rng,
+        restarts=1,
+        lengths=LENGTHS,
+        kernel=MATERN,
+        noise=limits,
+        shares=shares,
+    )
+
+
+def _noise(model: Kriging) -> float:
+    share = 1.0 if model.shares is None else float(np.median(model.shares))
+    return float(model.scale**2 * model.noise_variance * share)
+
+
+def _extended(model: Trended, point: Array) -> Trended:
+    """A model with one more value, the one that it expects: which changes no other expectation, and has no weight."""
+    rest = model.rest
+    shares = None if rest.shares is None else np.append(rest.shares, np.median(rest.shares))
+    more = replace(
+        rest,
+        inputs=np.vstack([rest.inputs, point]),
+        values=np.append(rest.values, rest.predict(point[None])),
+        alpha=np.append(rest.alpha, 0.0),
+        shares=shares,
+    )
+    return replace(model, rest=more)
