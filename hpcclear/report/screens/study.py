@@ -101,7 +101,8 @@ def _headline(best: Results, tiles: list[Tile], kept: bool) -> str:
         return _INFEASIBLE[found]
     if kept:
         return "Keep today's design: no simulated design is better"
-    said = [f"{lower(one.change)} {one.label}" for one in tiles[:2] if lower(one.change)]
+    compared = [one for one in tiles if one.change][:2]  # limits have no former value
+    said = [f"{lower(one.change)} {one.label}" for one in compared if lower(one.change)]
     text = f"Recommended design: {', '.join(said) or 'no significant change'}"
     return labels.sentence(text, best)
 
