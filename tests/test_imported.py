@@ -249,26 +249,26 @@ def test_what_has_no_counterpart_is_said(tmp_path):
 
 
 def _points(count, layer, place):
-    return files._pairs(
+    return files.drawn(
         [
             p
             for k in range(count)
             for p in ((0, "POINT"), (8, layer(k)), (10, place(k)[0]), (20, place(k)[1]))
         ],
         4,
-    )
+    ).encode()
 
 
 def _lines(count):
     ends = ((10, 50), (20, 31), (11, 47), (21, 43))
-    return files._pairs(
+    return files.drawn(
         [
             p
             for k in range(count)
             for p in ((0, "LINE"), (8, "ground"), *((code, k % base) for code, base in ends))
         ],
         4,
-    )
+    ).encode()
 
 
 def _chain(count):
