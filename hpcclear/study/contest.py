@@ -1,6 +1,6 @@
 """Which verified designs more simulations are worth: those that may change what is recommended, or how well it is known."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import compress
 
 import numpy as np
@@ -35,21 +35,24 @@ def worth_more(
     choices: Sequence[Choice],
     made: Sequence[Array],
     wanted: Sequence[MomentAccuracy],
+    without: Collection[int] = (),
 ) -> list[int]:
-    """Designs that more simulations are worth: in each objective, and in mean + 2 standard deviations where both are
-    minimised, the least of those that keep the constraints, unless it is known well enough; and others without which more
-    than `LOST` is lost as a rule, up to `contest` times its simulations. Where none is decided yet, the least of those that are
-    likely shown to keep them. The baseline, which all are compared with, is known as accurately or gets as many as these."""
+    """Designs that more simulations are worth, but for those `without` which it has to go: in each objective, and in mean + 2
+    standard deviations where both are minimised, the least of those that keep the constraints, unless it is known well enough;
+    and others without which more than `LOST` is lost as a rule, up to `contest` times its simulations. Where none is decided
+    yet, the least of those that are likely shown to keep them. The baseline, which all are compared with, is known as accurately
+    or gets as many as these."""
     settings, many, found = run.study.verification, verdicts.rivals(choices), set[int]()
     for case in run.study.cases:
         rows = [k for k, c in enumerate(choices) if (c.case, c.origin) == (case.name, "search")]
+        rows = [k for k in rows if k not in without]
         if not rows:
             continue
         count = len(case.goals)
         estimates = [goals_of(run, choices[k], made[k])[:count] for k in rows]
         values = np.array([[one.value for one in row] for row in estimates])
         shifts = np.array([[one.shifts for one in row] for row in estimates])
-        chances = np.array([_shown(run, choices[k], made[k], many[k]) for k in rows])
+        chances = np.array([shown(run, choices[k], made[k], many[k]) for k in rows])
         length = np.array([made[k][0].size for k in rows]) / settings.most_samples
         known = np.isfinite(values).all(axis=1) & (chances > 0.0)
         holds, open_ = known & (chances == 1.0), known & (chances < 1.0) & (length <= 0.5)
@@ -102,7 +105,7 @@ def size_of(run: StudyRun, case: Case, direction: Array, values: Array) -> float
     return float(abs(direction) @ np.array(sizes))
 
 
-def _shown(run: StudyRun, choice: Choice, values: Array, many: int) -> float:
+def shown(run: StudyRun, choice: Choice, values: Array, many: int) -> float:
     """Probability that a design will be shown to keep its constraints as one of `many`: 1 and 0 where that is decided; rare
     failures are decided later."""
     settings, count, chance = run.study.verification, values[0].size, 1.0

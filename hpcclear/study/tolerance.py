@@ -20,6 +20,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
+from hpcclear.base.verdict import Verdict
 from hpcclear.scene import Scene
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
@@ -127,7 +128,28 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         if run.study.paired:
             made = truth.made(run, designs, made, _left(run, taken))
     true = _widened(run, designs, made, truth.results_of(run, designs, made), taken)
+    without: set[int] = set()
+    while undone := _undone(run, designs, made, true) - without:
+        without |= undone
+        made = truth.made(run, designs, made, _left(run, taken), without)
+        true = _widened(run, designs, made, truth.results_of(run, designs, made), taken)
     return true | truth.explained(run, designs, made)
+
+
+def _undone(
+    run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], true: Result
+) -> set[int]:
+    """Rows of the designs that keep their constraints by samples, but not surely with what the tolerance takes."""
+    settings, many, found = run.study.verification, verdicts.rivals(designs), set[int]()
+    if settings.draws is not None:
+        return found
+    for k, choice in enumerate(designs):
+        kept = run.study.case(choice.case).kept
+        plain = [n for n, goal in enumerate(kept) if not verdicts.rare(goal, settings)]
+        open_ = (true["verdict"][k, plain] == Verdict.UNDECIDED).any()
+        if open_ and contest.shown(run, choice, made[k], many[k]) == 1.0:
+            found.add(k)
+    return found
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:

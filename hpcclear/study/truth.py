@@ -1,6 +1,6 @@
 """Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -72,12 +72,14 @@ def made(
     choices: Sequence[Choice],
     before: Sequence[Array] = (),
     wanted: Sequence[MomentAccuracy] = (),
+    without: Collection[int] = (),
 ) -> list[Array]:
     """Simulations of designs, as many as the study requires, (k, replicates, values) each: f, whether beyond
     Hertz's range, further responses.
 
     Only those that decide are simulated further: in each objective the least is known as accurately as the study (or `wanted`
-    of each design) requires, and others are simulated as long as choosing it may lose more than `LOST`.
+    of each design) requires, and others are simulated as long as choosing it may lose more than `LOST`; as if those `without`
+    which it has to go were not there.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def made(
         return drawn(run, choices, stage, stage, settings.draws)
     found = list(before) or begun(run, choices)
     wanted = wanted or [run.study.wanted] * len(choices)
-    while rows := contest.worth_more(run, choices, found, wanted):
+    while rows := contest.worth_more(run, choices, found, wanted, without):
         length = min(found[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
         rows = [k for k in rows if found[k].shape[2] == length]
         lengthen(run, choices, found, rows, stage, stage, length)
