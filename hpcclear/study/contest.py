@@ -40,8 +40,8 @@ def worth_more(
     """Designs that more simulations are worth, but for those `without` which it has to go: in each objective, and in mean + 2
     standard deviations where both are minimised, the least of those that keep the constraints, unless it is known well enough;
     and others without which more than `LOST` is lost as a rule, up to `contest` times its simulations. Where none is decided
-    yet, the least of those that are likely shown to keep them. The baseline, which all are compared with, is known as accurately
-    or gets as many as these."""
+    yet, the least of those that are likely shown to keep them. The baseline, which all are compared with, is known as
+    accurately or gets as many as these."""
     settings, many, found = run.study.verification, verdicts.rivals(choices), set[int]()
     for case in run.study.cases:
         rows = [k for k, c in enumerate(choices) if (c.case, c.origin) == (case.name, "search")]
