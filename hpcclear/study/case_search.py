@@ -136,11 +136,11 @@ class CaseSearch:
                 left.append((worth / (least or self._least), point))
         self._idle = self._idle + 1 if len(left) == count else 0
         if self._idle and left:  # the models may be wrong: there, and where nothing is known
-            point = max(left, key=lambda one: one[0])[1]
-            for _ in range(count):
+            point, apart = max(left, key=lambda one: one[0])[1], 1.0
+            while apart > 0.0 and len(beliefs.pending) < count:  # of a catalogue none may be left
                 beliefs.take(point)
                 rows += self.designs.add(point[None])
-                point = improvement.farthest(beliefs)[0]
+                point, apart = improvement.farthest(beliefs)
         self._again = {row for row in rows if self.designs.made[row].size}
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):
@@ -248,7 +248,7 @@ class CaseSearch:
         return bool(self.designs.made[row].shape[2] < self._size)
 
     def _unclear(self, row: int) -> bool:
-        """Whether more simulations of a design would tell how far it keeps its constraints."""
+        """Whether further simulations would reduce what is unknown of the constraints of a design."""
         length = self.designs.made[row].shape[2]
         errors = self.designs.of(row, length)[0][1, len(self._case.goals) :] if length else np.inf
         return self._longer(row) and bool((errors > np.array(self._agree) / 2.0).any())

@@ -90,7 +90,7 @@ class Failures:
         return sum(len(one.u) for one in own) // (len(self.goals) * importance.REPEATS)
 
     def excess(self, row: int, k: int, value: float, error: float) -> tuple[float, float]:
-        """`excess_of` a design by its weighted draws; value and error as they are where none of these fails."""
+        """`excess_of` a design by its weighted draws; the given value and error where no draw fails."""
         own = [one.weights for one in self.drawn[row] if one.constraint == k]
         each = np.hstack([one.reshape(importance.REPEATS, -1) for one in own]).mean(axis=1)
         share = float(each.mean())

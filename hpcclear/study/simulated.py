@@ -107,8 +107,8 @@ class Simulated:
         return np.array([found[0] - slopes * (few - many)[0], errors]), left
 
     def _left(self, length: int, slopes: Array) -> Array:
-        """Part of the errors by so many points that the surrogate does not explain, over all designs, (k,): the replicates of
-        one design do not show it, since few points tell little of a percentile."""
+        """Part of the errors by so many points that the surrogate does not explain, (k,). It is estimated from all designs
+        together, because the replicates of one design are too few for it."""
         rows = [k for k, size in enumerate(self.sizes) if size >= length]
         if self._parts.get(length, (0, slopes))[0] != len(rows):
             ours, its, their = (

@@ -188,7 +188,7 @@ def _trended(
     bounds: Array,
     rng: np.random.Generator,
 ) -> Trended:
-    """A model upon the trend or without it: whichever tells better of each design from all others."""
+    """A model with the trend or without it: the one with the smaller leave-one-out errors."""
     guess, known = trend(designs), np.isfinite(values)
     steps = guess[known] - guess[known].mean() if known.any() else guess[known]
     squares = float(steps @ steps)
