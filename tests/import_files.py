@@ -81,15 +81,8 @@ def workbook(made, random=None):
 
 def drawn(pairs, unit=4, end="\n"):
     """A drawing by its pairs of code and value."""
-    head = [
-        (0, "SECTION"),
-        (2, "HEADER"),
-        (9, "$INSUNITS"),
-        (70, unit),
-        (0, "ENDSEC"),
-        (0, "SECTION"),
-        (2, "ENTITIES"),
-    ]
+    head = [(0, "SECTION"), (2, "HEADER"), (9, "$INSUNITS"), (70, unit), (0, "ENDSEC")]
+    head += [(0, "SECTION"), (2, "ENTITIES")]
     every = [*head, *pairs, (0, "ENDSEC"), (0, "EOF")]
     return "".join(f"{code:3d}{end}{value}{end}" for code, value in every)
 

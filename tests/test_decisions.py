@@ -23,7 +23,7 @@ from hpcclear.results import dataset
 from hpcclear.results.content import Results, each
 from hpcclear.scene.cases import Constraint
 from hpcclear.scene.stages import Verification
-from hpcclear.study import failures, goals, verdicts
+from hpcclear.study import failures, goals, tolerance, verdicts
 from hpcclear.study.optimisation import Choice
 
 # -- verdicts ---------------------------------------------------------------------------------------
@@ -204,6 +204,17 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
     best = done.sel(design="light alpha")
     assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert int(best["rare_samples"]) > int(best["samples"])  # the rare failure needs more
+
+
+def test_a_design_whose_verdict_the_tolerance_undoes_makes_way_for_others(monkeypatch):
+    monkeypatch.setattr(
+        tolerance.contest, "shown", lambda *_: 1.0
+    )  # all satisfied by samples alone
+    case = SimpleNamespace(kept=[Constraint(statistic="exceedance", limit=1.0, most=0.5)])
+    study = SimpleNamespace(verification=Verification(), case=lambda name: case)
+    designs = [Choice("", "made", {"m2": 0.1 * k}) for k in range(2)]
+    true = {"verdict": np.array([[Verdict.HOLDS], [Verdict.UNDECIDED]])}
+    assert tolerance._undone(SimpleNamespace(study=study), designs, [None] * 2, true) == {1}
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -249,14 +249,10 @@ def test_what_has_no_counterpart_is_said(tmp_path):
 
 
 def _points(count, layer, place):
-    return files.drawn(
-        [
-            p
-            for k in range(count)
-            for p in ((0, "POINT"), (8, layer(k)), (10, place(k)[0]), (20, place(k)[1]))
-        ],
-        4,
-    ).encode()
+    points = (
+        ((0, "POINT"), (8, layer(k)), (10, place(k)[0]), (20, place(k)[1])) for k in range(count)
+    )
+    return files.drawn([pair for one in points for pair in one]).encode()
 
 
 def _lines(count):
