@@ -9,11 +9,12 @@ from pydantic import field_validator, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
-from hpcclear.scene.fields import Content, check_known, invalid
+from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.joints import Guide, length_path
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
+from hpcclear.scene.slider_crank import JOINTS
 from hpcclear.scene.tables import SceneTables
 
 
@@ -50,22 +51,21 @@ class ConsistentTables(SceneTables):
         """Without a path of its own, C drives the clearances there are."""
         try:
             if data["mechanism"].get("kind") == "planar":
-                rows = data["mechanism"]["joints"]
-                ideal = [name for name, row in rows.items() if _kind_of(rows, row) != "clearance"]
-                open_joints = [name for name in rows if name not in ideal]
-                paths = [f"mechanism.joints.{name}.clearance" for name in open_joints]
-                return _with_paths_of_clearance(data, paths) if paths else data
-            ideal = [
-                name
-                for name in ("crank_rod", "rod_slider")
-                if data["joints"][name]["kind"] == "ideal"
-            ]
-        except (AttributeError, KeyError, TypeError):
+                key, rows = "mechanism.joints", data["mechanism"]["joints"]
+            else:
+                key, rows = "joints", {name: data["joints"][name] for name in JOINTS}
+            kinds = {n: row.get("kind") or rows[row["like"]]["kind"] for n, row in rows.items()}
+            tables = {name: dict(data["study"].get(name, {})) for name in ("variables", "random")}
+        except (AttributeError, KeyError, TypeError, ValueError):
             return data  # the models below say what is wrong with it
-        if len(ideal) != 1:
+        paths = [f"{key}.{name}.clearance" for name, kind in kinds.items() if kind == "clearance"]
+        if not paths or tuple(paths) == SHORT_NAMES["C"]:
             return data
-        paths = [path for path in SHORT_NAMES["C"] if f".{ideal[0]}." not in path]
-        return _with_paths_of_clearance(data, paths)
+        for table, rows in tables.items():
+            row = rows.get("C")
+            if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
+                data = replace(data, f"study.{table}.C", {**row, "paths": paths})
+        return data
 
     def _check(self) -> None:
         self._check_mechanism()
@@ -211,19 +211,3 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
         if len(bands) > MAX_BANDS:
             raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
-
-
-def _kind_of(rows: Content, row: Content) -> str:
-    """Kind of a joint of a linkage, which may be ``like`` another."""
-    return str(row.get("kind") or rows[row["like"]]["kind"])
-
-
-def _with_paths_of_clearance(data: Any, paths: list[str]) -> Any:
-    """The content with these paths for every C of the study that names none."""
-    study = data.get("study")
-    for key in ("variables", "random"):
-        table = study.get(key) if isinstance(study, Mapping) else None
-        row = table.get("C") if isinstance(table, Mapping) else None
-        if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
-            data = replace(data, f"study.{key}.C", {**row, "paths": paths})
-    return data

@@ -106,7 +106,7 @@ class Scene(ConsistentTables):
 
     def _unit_of(self, path: str) -> str:
         """The SI unit of an entry of the resolved content, "" for one without or of which it is not known."""
-        if path in self._numbers():
+        if path in self._numbers:
             return self.unit(path)
         top, table, name, *_ = (*path.split("."), "", "")
         rows = () if self.study is None or top != "study" else getattr(self.study, table, ())

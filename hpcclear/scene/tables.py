@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field, PrivateAttr
@@ -58,9 +59,6 @@ class SceneTables(Table):
 
     _readings: tuple[Reading, ...] = PrivateAttr(())
     _texts: Texts = PrivateAttr(default_factory=dict)
-    _known_numbers: dict[str, float] | None = PrivateAttr(None)
-    _known_hash: str | None = PrivateAttr(None)
-    _linkage: Planar | None = PrivateAttr(None)
 
     @property
     def required_study(self) -> Study:
@@ -114,14 +112,11 @@ class SceneTables(Table):
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""
-        return tuple(
-            name for name in self.clearance_joints() if self.clearance_joint(name).wear is not None
-        )
+        return tuple(name for name, joint in self._loose.items() if joint.wear is not None)
 
     def films(self) -> dict[str, Film]:
         """Oil films by the labels of their joints."""
-        tables = {name: self.clearance_joint(name).film for name in self.clearance_joints()}
-        return {name: film for name, film in tables.items() if film is not None}
+        return {name: one.film for name, one in self._loose.items() if one.film is not None}
 
     @property
     def plugin_texts(self) -> dict[str, str]:
@@ -158,20 +153,17 @@ class SceneTables(Table):
     @property
     def has_thresholds(self) -> bool:
         """Whether some joint wears from a pressure on only."""
-        worn = [self.clearance_joint(name).wear for name in self.worn_joints()]
+        worn = [joint.wear for joint in self._loose.values()]
         return any(wear is not None and wear.threshold is not None for wear in worn)
 
     def waves(self) -> dict[str, int]:
         """How many waves bearings and journals have around them at most: in the scene, or as wear makes them."""
-        found = {"bearing": 0, "journal": 0}
-        tables = [self.clearance_joint(name) for name in self.clearance_joints()]
-        waved = [t.out_of_round for t in tables if t.out_of_round is not None]
-        for surface in found:
-            shapes = [getattr(one, surface) for one in waved]
-            found[surface] = max((s.given() for s in shapes if s is not None), default=0)
-            worn = [t.wear for t in tables if t.wear is not None and getattr(t.wear, surface)]
-            if self.wear is not None and worn:
-                found[surface] = max(found[surface], self.wear.waves)
+        found = {}
+        for surface in ("bearing", "journal"):
+            shapes = [getattr(one.out_of_round, surface, None) for one in self._loose.values()]
+            worn = any(getattr(one.wear, surface, None) for one in self._loose.values())
+            by_wear = self.wear.waves if self.wear is not None and worn else 0
+            found[surface] = max([by_wear, *(one.given() for one in shapes if one is not None)])
         return found
 
     @property
@@ -179,16 +171,17 @@ class SceneTables(Table):
         """The module of the template that writes this scene's linkage, `slider_crank`; None where the scene has its tables."""
         return None if isinstance(self.mechanism, Planar) else slider_crank
 
-    @property
+    @cached_property
     def linkage(self) -> Planar:
         """The mechanism by bodies, joints, drives and loads, as the scene has it or its template writes it."""
-        mechanism = self.mechanism
-        if isinstance(mechanism, Planar):
-            return mechanism
-        if self._linkage is None:
-            tables = self.drive, self.joints, self.effects
-            self._linkage = slider_crank.linkage_of(mechanism, *tables)
-        return self._linkage
+        if isinstance(self.mechanism, Planar):
+            return self.mechanism
+        return slider_crank.linkage_of(self.mechanism, self.drive, self.joints, self.effects)
+
+    @cached_property
+    def _loose(self) -> dict[str, Loose]:
+        """Tables of the joints with clearance by their names."""
+        return {joint.name: joint for joint in self.linkage.joints if is_loose(joint)}
 
     def path_in_linkage(self, path: str) -> str:
         """The entry of `linkage`, below ``mechanism``, that an entry of the scene stands for; itself if it stands for none."""
@@ -200,7 +193,7 @@ class SceneTables(Table):
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Names of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        return tuple(joint.name for joint in self.linkage.joints if is_loose(joint))
+        return tuple(self._loose)
 
     def contact_labels(self) -> tuple[str, ...]:
         """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
@@ -217,11 +210,11 @@ class SceneTables(Table):
 
     def pins(self) -> tuple[str, ...]:
         """Names of the joints with clearance that are pins in bearings."""
-        return tuple(n for n in self.clearance_joints() if not self.clearance_joint(n).corners)
+        return tuple(name for name, joint in self._loose.items() if not joint.corners)
 
     def guides(self) -> tuple[str, ...]:
         """Names of the guides and slots with clearance."""
-        return tuple(n for n in self.clearance_joints() if self.clearance_joint(n).corners)
+        return tuple(name for name, joint in self._loose.items() if joint.corners)
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
@@ -258,10 +251,7 @@ class SceneTables(Table):
 
     def clearance_joint(self, label: str) -> Loose:
         """The table of a joint with clearance, or of a contact's joint."""
-        name = label.partition(".")[0]
-        found = next(joint for joint in self.linkage.joints if joint.name == name)
-        assert isinstance(found, Loose)
-        return found
+        return self._loose[label.partition(".")[0]]
 
     @property
     def slider_crank(self) -> SliderCrank:
@@ -269,15 +259,13 @@ class SceneTables(Table):
         assert isinstance(self.mechanism, SliderCrank)
         return self.mechanism
 
-    @property
+    @cached_property
     def hash(self) -> str:
         """SHA-256 of the inputs: spelling, comments and units of the file do not matter, nor does [about]."""
-        if self._known_hash is None:  # a scene never changes, and every cache asks
-            # The order of keys stays as it is: tables have the model's order, and the order of
-            # study variables is the order of the columns of their design, so it has to count.
-            content = json.dumps(inputs_of(self.resolved()), ensure_ascii=True, allow_nan=False)
-            self._known_hash = hashlib.sha256(content.encode()).hexdigest()
-        return self._known_hash
+        # The order of keys stays as it is: tables have the model's order, and the order of
+        # study variables is the order of the columns of their design, so it has to count.
+        content = json.dumps(inputs_of(self.resolved()), ensure_ascii=True, allow_nan=False)
+        return hashlib.sha256(content.encode()).hexdigest()
 
     def resolved(self) -> Content:
         """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
@@ -295,16 +283,14 @@ class SceneTables(Table):
 
     def numeric_paths(self) -> tuple[str, ...]:
         """Dotted paths of every physical number of this scene: what a study may vary."""
-        return tuple(self._numbers())
+        return tuple(self._numbers)
 
     def number(self, path: str) -> float:
         """The physical number at a dotted path, SI; raises InputError if the scene has no number there."""
-        numbers = self._numbers()
-        if path not in numbers:
-            raise InputError(
-                "path", path, "is not a number of this scene", nearest(path, tuple(numbers))
-            )
-        return numbers[path]
+        if path not in self._numbers:
+            remedy = nearest(path, self.numeric_paths())
+            raise InputError("path", path, "is not a number of this scene", remedy)
+        return self._numbers[path]
 
     def baseline(self, name: str) -> float:
         """Where the scene itself is in the column of a study variable: its number, SI, or the row of its table.
@@ -360,16 +346,11 @@ class SceneTables(Table):
         """What was written for its numbers, by their values and units in SI."""
         return self._texts
 
-    def _numbers(self) -> Mapping[str, float]:
-        if self._known_numbers is None:  # a scene never changes, and a swarm asks often
-            tables = {name: plain(getattr(self, name)) or {} for name in PHYSICAL}
-            known = quantities()
-            self._known_numbers = {
-                path: value
-                for path, value in flatten(tables)
-                if path in known and isinstance(value, float)
-            }
-        return self._known_numbers
+    @cached_property
+    def _numbers(self) -> dict[str, float]:
+        tables = {name: plain(getattr(self, name)) or {} for name in PHYSICAL}
+        known = quantities()
+        return {p: one for p, one in flatten(tables) if p in known and isinstance(one, float)}
 
 
 def _alike(one: object, other: object) -> bool:
