@@ -309,13 +309,10 @@ def test_an_endless_formula_is_refused_in_files_overrides_and_results(tmp_path):
     assert changed != text
     path = tmp_path / "scene.toml"
     path.write_text(changed, encoding="utf-8")
-    table = {"law": "expression", "force": ENDLESS}
     for call in (
         lambda: load_scene(path),
         lambda: load_scene(place, [f"effects.contact={endless}"]),
         lambda: scene_of_text(changed, "result.nc"),
-        lambda: scene_of_text(f"# set: effects.contact={endless}\n{text}", "result.nc"),
-        lambda: scene_of_text(f"# changed: effects.contact = {table!r}\n{text}", "result.nc"),
     ):
         with pytest.raises(InputError, match="too large"):
             call()

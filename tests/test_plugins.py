@@ -1,6 +1,5 @@
 """Plug-ins by name: from files beside a scene and from installed packages; whose source is run, and when."""
 
-import json
 from pathlib import Path
 
 import opened
@@ -184,10 +183,3 @@ def test_commands_name_the_file_that_a_scene_runs(tmp_path, capsys):
     assert note in capsys.readouterr().err
     code, output = warm_command("check", QUICKSTART, "--no-cost")
     assert "Python code" not in output
-
-
-def test_a_note_of_a_change_smuggles_no_source_in():
-    text = load_scene(QUICKSTART).text
-    change = f"# changed: plugins.files = {json.dumps({'shapes': {'source': SOURCE}})}\n"
-    with pytest.raises(UntrustedSource):
-        scene_of_text(change + text, "samples.nc")

@@ -257,7 +257,6 @@ def folded(node: ast.expr, made: Callable[[], float]) -> ast.expr:
 
 
 def _shown(node: ast.expr) -> str:
-    """A part of a formula for a message."""
     try:
         text = repr(ast.unparse(node))
     except ValueError:  # of a whole number of more digits than Python prints

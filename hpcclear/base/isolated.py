@@ -33,7 +33,6 @@ def _package() -> None:
 
 
 def _main() -> object:
-    """Call what `python` names."""
     _package()
     module, _, function = sys.argv[1].partition(":")
     return getattr(importlib.import_module(module), function)(*sys.argv[2:])

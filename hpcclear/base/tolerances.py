@@ -26,10 +26,6 @@ class PartSize:
     mean: float
     deviation: float
 
-    @property
-    def _ends(self) -> tuple[float, float]:
-        return (self.lower - self.mean) / self.deviation, (self.upper - self.mean) / self.deviation
-
     def nodes(self) -> tuple[Array, Array]:
         """Diameters at equal steps, (FINE,), and the shares of parts that they stand for."""
         places = self.lower + (self.upper - self.lower) * (np.arange(FINE) + 0.5) / FINE
@@ -42,7 +38,8 @@ class PartSize:
             return np.clip((diameter - self.lower) / (self.upper - self.lower), 0.0, 1.0)
         from scipy.special import ndtr  # as in `normal`
 
-        below, above = ndtr(np.array(self._ends))
+        ends = np.array([self.lower, self.upper])
+        below, above = ndtr((ends - self.mean) / self.deviation)
         found = (ndtr((diameter - self.mean) / self.deviation) - below) / (above - below)
         return np.clip(found, 0.0, 1.0)
 

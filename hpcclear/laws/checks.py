@@ -72,7 +72,6 @@ _PAIRS = {
 
 
 def _check_declared(law: Law) -> None:
-    """LawError unless what a law declares is complete."""
     for own, other, why in _PAIRS[law.kind]:
         if getattr(law, own) and not getattr(law, other):
             geometry = ", or name a geometry in the scene" if other == "elastic" else ""

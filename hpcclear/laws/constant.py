@@ -117,7 +117,6 @@ class _Parts(ast.NodeTransformer):
         return made
 
     def function(self) -> Function:
-        """What is left."""
         body = "\n".join(ast.unparse(ast.fix_missing_locations(one)) for one in self.tree.body)
         used = {one.id for one in ast.walk(ast.parse(body)) if isinstance(one, ast.Name)}
         names = dict.fromkeys([*self.arguments, INVERSE, *self.constants.values()])
@@ -125,7 +124,6 @@ class _Parts(ast.NodeTransformer):
         return self._made(self.title, [one for one in names if one in used], indented)
 
     def once(self) -> Function:
-        """What gives the constants."""
         used = {
             one.id
             for text in self.constants
@@ -138,7 +136,6 @@ class _Parts(ast.NodeTransformer):
 
 
 def _count(tree: ast.AST) -> int:
-    """Quotients in it."""
     return sum(isinstance(one, ast.Div) for one in ast.walk(tree))
 
 

@@ -20,7 +20,7 @@ def text_of_rate(objective: Objective) -> str:
     Raises LawError if it has more in it than arithmetic.
     """
     assert objective.rate is not None
-    call = f"own_rate({', '.join(_ROWS[name] for name in arguments(objective.rate))})"
+    call = f"own_rate({', '.join(_READ[name][0] for name in arguments(objective.rate))})"
     parts = [
         HEAD.format(title=f"The rate of {objective.name}"),
         "from hpcclear.dynamics import layout as at\n",
@@ -35,45 +35,27 @@ def _rate(row: str) -> str:
     return f"work[(at.RATE_NOW + {row}) * W + i]"
 
 
-_ROWS = {
-    "gap": _rate("joint.gap"),
-    "depth": f"no_less({_rate('joint.gap')}, 0.0)",
-    "gap_rate": _rate("joint.rate"),
-    "normal_force": _rate("joint.force"),
-    "friction_force": _rate("joint.friction"),
-    "sliding_speed": _rate("joint.sliding_speed"),
-    "direction_x": _rate("joint.normal_x"),
-    "direction_y": _rate("joint.normal_y"),
-    "clearance": "par[(joint.block + at.CLEARANCE) * W + i]",
-    "bearing_radius": "par[(joint.block + at.BEARING_RADIUS) * W + i]",
-    "journal_radius": "par[(joint.block + at.JOURNAL_RADIUS) * W + i]",
-    "drive_cosine": "cosine",
-    "drive_sine": "sine",
-    "drive_speed": "speed",
-    "drive_torque": _rate("at.DRIVE_MOMENT"),
-    "acceleration_x": _rate("at.FOLLOWED_ACCELERATION"),
-    "acceleration_y": _rate("at.FOLLOWED_ACROSS"),
+_READ: dict[str, tuple[str, float, float]] = {
+    "gap": (_rate("joint.gap"), -3e-4, 1e-5),
+    "depth": (f"no_less({_rate('joint.gap')}, 0.0)", 0.0, 1e-5),
+    "gap_rate": (_rate("joint.rate"), -10.0, 10.0),
+    "normal_force": (_rate("joint.force"), 0.0, 1e4),
+    "friction_force": (_rate("joint.friction"), -1e3, 1e3),
+    "sliding_speed": (_rate("joint.sliding_speed"), -10.0, 10.0),
+    "direction_x": (_rate("joint.normal_x"), -1.0, 1.0),
+    "direction_y": (_rate("joint.normal_y"), -1.0, 1.0),
+    "drive_cosine": ("cosine", -1.0, 1.0),
+    "drive_sine": ("sine", -1.0, 1.0),
+    "drive_speed": ("speed", -500.0, 500.0),
+    "drive_torque": (_rate("at.DRIVE_MOMENT"), -100.0, 100.0),
+    "acceleration_x": (_rate("at.FOLLOWED_ACCELERATION"), -1e4, 1e4),
+    "acceleration_y": (_rate("at.FOLLOWED_ACROSS"), -1e4, 1e4),
+    **{
+        name: (f"par[(joint.block + at.{name.upper()}) * W + i]", TYPICAL[name], TYPICAL[name])
+        for name in ("clearance", "bearing_radius", "journal_radius")
+    },
 }
-"""Where what an objective's rate requires stands."""
-
-
-_RANGES = {
-    "gap": (-3e-4, 1e-5),
-    "depth": (0.0, 1e-5),
-    "gap_rate": (-10.0, 10.0),
-    "normal_force": (0.0, 1e4),
-    "friction_force": (-1e3, 1e3),
-    "sliding_speed": (-10.0, 10.0),
-    "direction_x": (-1.0, 1.0),
-    "direction_y": (-1.0, 1.0),
-    "drive_cosine": (-1.0, 1.0),
-    "drive_sine": (-1.0, 1.0),
-    "drive_speed": (-500.0, 500.0),
-    "drive_torque": (-100.0, 100.0),
-    "acceleration_x": (-1e4, 1e4),
-    "acceleration_y": (-1e4, 1e4),
-}
-"""Between what rates are tried."""
+"""Where what an objective's rate requires stands, and between what numbers rates are tried."""
 
 
 def check_objective(objective: Objective) -> None:
@@ -106,9 +88,10 @@ def _check_rate(objective: Objective) -> None:
     """LawError unless the rate is finite, in flight as well, and what is made of it has its unit."""
     between = np.linspace(0.0, 1.0, 7)
     shares = np.array(np.meshgrid(between, between)).reshape(2, -1)
-    given: dict[str, object] = dict(TYPICAL)
-    for k, (name, (low, high)) in enumerate(_RANGES.items()):
-        given[name] = low + (high - low) * shares[k % 2]
+    given = {
+        name: low + (high - low) * shares[k % 2]
+        for k, (name, (_, low, high)) in enumerate(_READ.items())
+    }
     assert objective.rate is not None
     found = np.asarray(evaluate(objective.rate, given), float)
     if not np.isfinite(found).all():
@@ -125,7 +108,6 @@ def _check_rate(objective: Objective) -> None:
 
 
 def _check_value(objective: Objective, numbers: Mapping[str, object]) -> None:
-    """LawError unless the value is a number and has its unit."""
     units = {**RECORDED, "rate": objective.unit_of_rate}
     if objective.value is None:
         _fits(registry().Quantity(1.0, objective.unit_of_rate), objective.unit, "its rate")
@@ -161,7 +143,6 @@ def _with_unit(
 
 
 def _fits(found: Quantity, unit: str, what: str) -> None:
-    """LawError unless a quantity is of a unit."""
     try:
         expected = unit_of(unit, what).units
     except LawError:

@@ -4,9 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import GetJsonSchemaHandler
-from pydantic_core import CoreSchema
-
 from hpcclear.scene.fields import Converted, Table, invalid
 
 LONGEST = 120
@@ -27,9 +24,8 @@ class ShortText(Converted):
             raise invalid(reason, "Shorten it, or remove the entry")
         return text
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def json_schema(self) -> dict[str, Any]:
+        """A text of so many letters."""
         return {"type": "string", "minLength": 1, "maxLength": LONGEST}
 
 

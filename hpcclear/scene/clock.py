@@ -123,7 +123,6 @@ def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> M
 
 
 def _offset(zone: str) -> int:
-    """Seconds by which a zone is ahead."""
     digits = zone[1:].replace(":", "")
     if not digits.isdecimal():
         return 0

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from hpcclear.base.pieces import Rows
 from hpcclear.base.units import shows_point
@@ -71,9 +69,8 @@ class Pairs(Converted):
             raise invalid(f"the first number is below {self.least:g}", remedy)
         return rows
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def json_schema(self) -> JsonSchemaValue:
+        """Pairs, a file of them, or a number."""
         number, text = {"type": "number"}, {"type": "string"}
         pair = {"type": "array", "items": {"anyOf": [number, text]}, "minItems": 2, "maxItems": 2}
         table = {"type": "array", "items": pair, "minItems": self.fewest, "maxItems": self.most}

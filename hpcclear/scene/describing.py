@@ -1,6 +1,7 @@
 """A scene in words: effects that are on, numbers that are hardly meant, differences of scenes, cited work."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 
 from hpcclear.plugins.sources import digest
@@ -15,16 +16,20 @@ FASTEST = 30.0
 """Mean slider speed of the fastest engines that are built, m/s: racing engines reach 26."""
 MOST_TURNS = 30_000.0
 """Revolutions a minute: small model engines reach as many."""
-SOFTEST, STIFFEST = 1e6, 1.3e12
-"""Young's moduli of soft rubber and of diamond, Pa."""
 WIDEST = 0.1
 """Clearance over bearing radius; worn bearings reach a hundredth, the mechanisms that publications study a twentieth."""
-LONGEST = 5.0
-"""Of a crank or rod, m."""
-THINNEST, THICKEST = 1e-5, 20.0
-"""Viscosities of air and of the thickest gear oil when cold, Pa s."""
 STEEL = 7850.0
 """kg/m3."""
+PLAUSIBLE = (
+    (r"mechanism\.(crank|rod|bodies\.[^.]+)\.length", 0.0, 5.0, "", "long for a bar", 'if mm are meant, write "{:g} mm"'),
+    (r".*\.youngs_modulus", 1e6, 1.3e12, "softer than rubber", "stiffer than diamond",
+     'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'),
+    (r".*\.film\.viscosity", 1e-5, 20.0, "thinner than air", "thicker than any oil",
+     'engine oil has 0.01 Pa s when hot and 0.3 when cold, and if mPa s are meant, write "{:g} mPa*s"'),
+    (r"effects\.gravity", 0.0, 100.0, "", "ten times the Earth's", "write 9.81"),
+    (r"effects\.friction\.(static_)?coefficient", 0.0, 1.0, "", "above 1", "lubricated bearings have 0.001 to 0.1"),
+)  # fmt: skip
+"""Entries by their paths, the smallest and largest number (SI) that is likely meant, what one beyond these is, and a remedy."""
 
 
 def implausible(scene: SceneTables) -> Iterator[str]:
@@ -32,23 +37,18 @@ def implausible(scene: SceneTables) -> Iterator[str]:
     if isinstance(scene.mechanism, SliderCrank):
         yield from _drive(scene)
         yield from _rod(scene)
+    for path in scene.numeric_paths():
+        for pattern, least, most, below, above, remedy in PLAUSIBLE:
+            number = scene.number(path)
+            if re.fullmatch(pattern, path) and number and not least <= number <= most:
+                what = below if number < least else above
+                yield f"{path} = {scene.shown(path)} is {what}; {remedy.format(number)}"
     yield from _bodies(scene)
     yield from _joints(scene)
-    yield from _films(scene)
     if scene.numerics.beta == 0.0 and (
         scene.template is None or scene.numerics.formulation == "baumgarte"
     ):
         yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
-    effects = scene.effects
-    if effects.gravity > 100.0:
-        gravity = scene.shown("effects.gravity")
-        yield f"effects.gravity = {gravity} is ten times the Earth's; write 9.81"
-    for name in ("coefficient", "static_coefficient"):
-        if (effects.friction.value(name) or 0.0) > 1.0:
-            yield (
-                f"effects.friction.{name} = {effects.friction.value(name):g} is above 1; "
-                "lubricated bearings have 0.001 to 0.1"
-            )
 
 
 def _drive(scene: SceneTables) -> Iterator[str]:
@@ -71,8 +71,6 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
     ]
     bars = [(key, bar, bar.length) for key, bar in bodies if bar.length is not None]
     for key, bar, length in bars:
-        if length > LONGEST:
-            yield f'{key}.length = {scene.shown(f"{key}.length")}; if mm are meant, write "{length:g} mm"'
         if (own := bar.own_inertia) > 100.0 * bar.mass * length**2:
             yield (
                 f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {own / (bar.mass * length**2):.2g} times mass times "
@@ -109,19 +107,6 @@ def _rod(scene: SceneTables) -> Iterator[str]:
 
 
 def _joints(scene: SceneTables) -> Iterator[str]:
-    for name in scene.clearance_joints():
-        joint, key = (
-            scene.clearance_joint(name),
-            scene.path_in_scene(f"mechanism.joints.{name}.materials"),
-        )
-        for part in ("bearing", "journal"):
-            modulus = getattr(joint.materials, part).youngs_modulus
-            if not SOFTEST <= modulus <= STIFFEST:
-                what = "softer than rubber" if modulus < SOFTEST else "stiffer than diamond"
-                yield (
-                    f"{key}.{part}.youngs_modulus = {scene.shown(f'{key}.{part}.youngs_modulus')} is {what}; "
-                    'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'
-                )
     for name in scene.pins():
         pin, key = scene.pin(name), scene.joint_key(name)
         if pin.clearance > WIDEST * pin.bearing_radius:
@@ -129,18 +114,8 @@ def _joints(scene: SceneTables) -> Iterator[str]:
                 f"{key}.clearance = {scene.shown(f'{key}.clearance')} is {pin.clearance / pin.bearing_radius:.0%} of the "
                 "bearing's radius; write the radial clearance, half of the difference of the diameters"
             )
-
-
-def _films(scene: SceneTables) -> Iterator[str]:
     for name, film in scene.films().items():
         key = f"{scene.joint_key(name)}.film"
-        if film.viscosity and not THINNEST <= film.viscosity <= THICKEST:
-            what = "thinner than air" if film.viscosity < THINNEST else "thicker than any oil"
-            yield (
-                f"{key}.viscosity = {scene.shown(f'{key}.viscosity')} is {what}; "
-                "engine oil has 0.01 Pa s when hot and 0.3 when cold, "
-                f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
-            )
         ratio = 0.5 * film.length / scene.pin(name).bearing_radius
         least, most = film.law.lengths
         if not least <= ratio <= most:
@@ -291,7 +266,6 @@ def unused(scene: SceneTables) -> Iterator[str]:
 
 
 def _entry(scene: SceneTables, key: str, entries: Mapping[str, object]) -> str:
-    """An entry of a scene in words."""
     if key not in entries:
         return "(not set)"
     return scene.shown(key) if key in scene.numeric_paths() else repr(entries[key])

@@ -152,10 +152,19 @@ class Converted:
         """The value as the scene holds it; an error for validators where it is none."""
         raise NotImplementedError
 
+    def json_schema(self) -> JsonSchemaValue:
+        """What a file may have there."""
+        raise NotImplementedError
+
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.convert)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return self.json_schema()
 
 
 @dataclass(frozen=True)
@@ -238,16 +247,13 @@ class Quantity(Converted):
         """The bounds in words, in a unit; by default that of the entry."""
         unit = self.unit if unit is None else unit
         times = float(factor(unit, self.unit)) if unit != self.unit else 1.0
-        parts = [
-            f"{word} {bound / times:.6g}"
-            for word, bound in (
-                ("above", self.above),
-                ("at least", self.least),
-                ("below", self.below),
-                ("at most", self.most),
-            )
-            if bound is not None
-        ]
+        words = {
+            "above": self.above,
+            "at least": self.least,
+            "below": self.below,
+            "at most": self.most,
+        }
+        parts = [f"{word} {one / times:.6g}" for word, one in words.items() if one is not None]
         parts += ["other than 0"] * self.nonzero
         return " and ".join(parts) + (f" {unit}" if unit else "")
 
@@ -256,18 +262,14 @@ class Quantity(Converted):
         unit = f" in {self.unit}" if self.unit and not limits else ""
         return f"Write a number{unit}{' ' if limits else ''}{limits}"
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        number: JsonSchemaValue = {"type": "number"}
-        for name, bound in (
-            ("exclusiveMinimum", self.above),
-            ("exclusiveMaximum", self.below),
-            ("minimum", self.least),
-            ("maximum", self.most),
-        ):
-            if bound is not None:
-                number[name] = bound
+    def json_schema(self) -> JsonSchemaValue:
+        """A number within the bounds, or a text with a unit."""
+        words = ("exclusiveMinimum", "exclusiveMaximum", "minimum", "maximum")
+        bounds = zip(words, (self.above, self.below, self.least, self.most), strict=True)
+        number: JsonSchemaValue = {
+            "type": "number",
+            **{k: one for k, one in bounds if one is not None},
+        }
         if self.nonzero:
             number["not"] = {"const": 0}
         if not self.unit:
@@ -295,9 +297,8 @@ class Count(Converted):
             raise invalid(f"must be from {self.least} to {self.most}", remedy)
         return value
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def json_schema(self) -> JsonSchemaValue:
+        """A whole number within the bounds."""
         return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
@@ -309,18 +310,27 @@ OF_FILE = {"type": "object", "title": "FileCurve"}
 class NamedRows:
     """A table of named rows, kept in file order as a tuple, because a dict would not be frozen."""
 
+    pairs: bool = False
+    """Whether a row may be ``[x, y]``."""
+
     def rows(self, value: object) -> object:
         """``{name: {...}}`` as ``[{"name": name, ...}]``."""
         if isinstance(value, tuple):
             return value
+        form = "[x, y]" if self.pairs else "{ key = value }"
         if not isinstance(value, Mapping):
-            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+            raise invalid("a table is expected here", f"Write it as [table] or {{ NAME = {form} }}")
+        made = []
         for name, row in value.items():
+            if self.pairs and isinstance(row, (list, tuple)) and len(row) == 2:
+                row = {"x": row[0], "y": row[1]}
             if not isinstance(row, Mapping):
-                raise invalid("a table is expected here", "Write it as { key = value }", str(name))
+                what = "a pair" if self.pairs else "a table"
+                raise invalid(f"{what} is expected here", f"Write it as {form}", str(name))
             if "name" in row:
                 raise invalid("the name is the key of this table", "Remove it", f"{name}.name")
-        return [{"name": name, **row} for name, row in value.items()]
+            made.append({"name": name, **row})
+        return made
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -378,23 +388,5 @@ class NamedPlace(Position):
     name: str
 
 
-class PlaceRows(NamedRows):
-    """``{name = [x, y]}`` as named rows."""
-
-    def rows(self, value: object) -> object:
-        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; an error for validators where it is none."""
-        if isinstance(value, tuple):
-            return value
-        if not isinstance(value, Mapping):
-            raise invalid("named points are expected here", "Write { name = [x, y] }")
-        places = dict(value)
-        for name, place in places.items():
-            if isinstance(place, (list, tuple)):
-                if len(place) != 2:
-                    raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
-                places[name] = {"x": place[0], "y": place[1]}
-        return super().rows(places)
-
-
-NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]
+NamedPlaces = Annotated[tuple[NamedPlace, ...], NamedRows(pairs=True)]
 NOWHERE = Position(x=0.0, y=0.0)

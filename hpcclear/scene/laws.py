@@ -44,9 +44,8 @@ class LawName(Converted):
             raise invalid("is not one of the known values", nearest(str(value), known))
         return str(value)
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def json_schema(self) -> JsonSchemaValue:
+        """One of their names."""
         return {"type": "string", "enum": [*names(self.kind)]}
 
 
@@ -297,20 +296,16 @@ def _curve(data: Mapping[str, object]) -> Rows | None:
 
 
 def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> JsonSchemaValue:
-    entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
+    entry = quantity_of(parameter).json_schema()
     whose = [
-        name for name, one in every.items() if parameter.name in {p.name for p in one.parameters}
+        name for name, one in every.items() if parameter.name in [p.name for p in one.parameters]
     ]
     if parameter.count > 1:
         many = parameter.count
         entry = {"type": "array", "items": entry, "minItems": many, "maxItems": many}
-    words = f"{parameter.words}, {parameter.unit or 'a number'} ({', '.join(whose)}"
-    return {
-        **entry,
-        "description": words + f"; default {parameter.default})"
-        if parameter.default is not None
-        else words + ")",
-    }
+    default = "" if parameter.default is None else f"; default {parameter.default}"
+    words = f"{parameter.words}, {parameter.unit or 'a number'} ({', '.join(whose)}{default})"
+    return {**entry, "description": words}
 
 
 def _value(parameter: Parameter, value: object) -> float | tuple[float, ...]:

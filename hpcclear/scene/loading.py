@@ -1,7 +1,5 @@
 """From a TOML file, or a mapping, to a `Scene`: reading and overrides."""
 
-import ast
-import itertools
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -10,6 +8,7 @@ from pathlib import Path
 import tomli_w
 
 from hpcclear.base.errors import InputError, content_of
+from hpcclear.base.plain import plain as printable
 from hpcclear.base.written import Reading
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import files_named
@@ -26,10 +25,6 @@ _SHORTER = "Scenes have a few thousand bytes"
 _DOTTED = re.compile(
     r"""(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){17}"""
 )
-
-
-_NOTE = "# set: "  # before each override, at the head of a scene's text
-_CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
 def load_scene(
@@ -74,57 +69,33 @@ def load_scene(
     if text is not None and not own_plugins:
         content = with_texts(content, lambda module: _beside(folder, module))
     scene = scene_of(Scene, content)
-    notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
-    if text is None or named or own_plugins:
-        # results carry the values: whoever has one need not have the file
-        head = "".join(f"# {line}\n" for line in read_as)
-        own = scene.to_toml() if text is None else tomli_w.dumps(content, multiline_strings=True)
-        scene._text = head + own
-        scene._readings = (*scene.readings, *read_as)
+    scene._readings = (*scene.readings, *read_as)
+    # results carry what was set, and the values of files: whoever has one needs nothing else
+    notes = [*(f"set: {one}" for one in overrides), *map(str, read_as)]
+    head = "".join(f"# {printable(' '.join(note.split()))}\n" for note in notes)
+    plugins = {} if scene.plugins is None else {"plugins": plain(scene.plugins)}
+    if text is None:
+        scene._text = head and head + scene.to_toml()
+    elif head or own_plugins:
+        scene._text = head + tomli_w.dumps({**content, **plugins}, multiline_strings=True)
     else:
-        # an empty line ends the notes, whatever a file's own first comment says
-        own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
-        plugins = {} if scene.plugins is None else {"plugins": plain(scene.plugins)}
         below = "\n\n" + tomli_w.dumps(plugins, multiline_strings=True) if plugins else ""
-        scene._text = notes + own + below
+        scene._text = text + below
     return scene
 
 
 def scene_of_text(text: str, name: str) -> Scene:
-    """Return the scene of a text that a result file carries, with what was set or changed noted at its head.
+    """Return the scene of a text that a result file carries.
 
     No file is opened, whatever the text names: it may be somebody else's. Python text in it is run in a `trusting` block
     only. Raises InputError as `load_scene`, or if values are in a file, or nobody has said that Python text in it may be run.
     """
     content = parse(text, name)
-    notes = list(
-        itertools.takewhile(lambda line: line.startswith((_NOTE, _CHANGE)), text.splitlines())
-    )
-    for line in notes:
-        if line.startswith(_NOTE):
-            content = entry_replaced(content, *_override(line.removeprefix(_NOTE)))
-    changes = dict(_change(line) for line in reversed(notes) if line.startswith(_CHANGE))
-    files = [path for path in changes if path.rpartition(".")[2] == "file"]
-    for key in (*files_named(content), *files):
+    for key in files_named(content):
         reason = "its scene names a file of values that the result does not contain"
         raise InputError(key, name, reason, "Create the result again with this version")
-    changed = content
-    for path, value in changes.items():
-        changed = entry_replaced(changed, path, value)
     check_trust(content, name)
-    check_trust(changed, name)
-    scene = load_scene(content, trust=True)
-    return scene.with_(changes) if changes else scene
-
-
-def _change(line: str) -> tuple[str, object]:
-    """Path and value of a note that `Scene.with_` left."""
-    path, _, value = line.removeprefix(_CHANGE).partition(" = ")
-    try:
-        return path, ast.literal_eval(value)
-    except (ValueError, SyntaxError, RecursionError, MemoryError):
-        reason = "the note of a change cannot be read"
-        raise InputError("scene", line, reason, "Correct the line, or remove it") from None
+    return load_scene(content, trust=True)
 
 
 def _beside(folder: Path, module: str) -> str | None:

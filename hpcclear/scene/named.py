@@ -21,23 +21,11 @@ SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
 }
 """Names that stand for scene entries where no path is given; nothing else depends on a name."""
 
-RESERVED = frozenset(
-    (
-        *("sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap"),
-        *(
-            "peak_contact_force",
-            "latched",
-            "rhs_evaluations",
-            "status",
-            "flags",
-            *ON_REQUEST,
-            *JUDGED,
-        ),
-        *("case", "run", "solution", "design", "model", "mean", "deviation"),
-        "label",
-        *("searched_first", "searched_second"),
-    )
-)
+RESERVED = frozenset((
+    "sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap", "peak_contact_force", "latched",
+    "rhs_evaluations", "status", "flags", "case", "run", "solution", "design", "model", "mean", "deviation", "label",
+    "searched_first", "searched_second", *ON_REQUEST, *JUDGED,
+))  # fmt: skip
 """Names of dimensions and results in the datasets."""
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")

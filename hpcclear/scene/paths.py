@@ -127,7 +127,6 @@ class Quantities(Mapping[str, Quantity]):
         self._own = own  # by path and kind of the row, "" for any other
 
     def _of(self, path: object) -> Quantity | None:
-        """Of an entry that all scenes have alike."""
         kinds = self._own.get(str(path)) or self._own.get(_general(path))
         row = str(path).rpartition(".")[0]
         kind = _kinds.get().get(row) or _SEEN.get(row, "")

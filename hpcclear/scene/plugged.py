@@ -5,9 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.registry import Registry
@@ -58,9 +56,8 @@ class PluginName(Converted):
             self.registry.get(value)
         return value
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def json_schema(self) -> JsonSchemaValue:
+        """One of ours, or any other name."""
         other = {"type": "string", "description": 'of a package, or "module:Name" of a file'}
         return {"anyOf": [{"enum": list(self.registry.ours())}, other]}
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -245,65 +245,51 @@ def read_points(path: str | Path, scene: Scene) -> Points:
     from hpcclear.scene.sheets import read  # with the readers of all kinds of files
 
     key, sheet = str(path), read(Path(path))
-    labels, columns = [], []
-    for column in sheet.columns:
-        found = _driven(column, scene, key, sheet)
-        if found is None:
-            labels.append(column)
-        else:
-            columns.append(found)
+    driven = [(column, _driven(column, scene, key, sheet)) for column in sheet.columns]
+    labels = [column for column, paths in driven if not paths]
+    columns = [column for column, paths in driven if paths]
     if not columns:
         reason = "no column has numbers of this scene"
         raise InputError(key, ", ".join(sheet.names), reason, "Name one such as m2 [g]")
-    names, paths = tuple(c.column.name for c in columns), tuple(c.paths for c in columns)
+    names, paths = tuple(c.name for c in columns), tuple(paths for _, paths in driven if paths)
     twice = [path for path, count in Counter(itertools.chain(*paths)).items() if count > 1]
     if twice:
         reason = f"two columns drive {twice[0]}"
         raise InputError(key, ", ".join(names), reason, "Remove one of them")
-    values = np.column_stack([column.read(sheet) for column in columns])
+    values = np.column_stack(list(map(_read, itertools.repeat(sheet), columns, paths)))
     named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
     points = Points(names, values, paths, named if labels else ())
     check_points(scene, points, lambda row: f"{key}, line {sheet.lines[row]}")
     return points
 
 
-class _Driven(NamedTuple):
-    """A column of numbers of the scene, and the entries that it drives."""
-
-    paths: tuple[str, ...]
-    column: "SheetColumn"
-
-    def read(self, sheet: "Sheet") -> Array:
-        """Its cells in SI, shape (n,), within the bounds of every entry it drives."""
-        every = [quantities()[path] for path in self.paths]
-        values = sheet.si(self.column, every[0].unit, sheet.path)
-        for quantity in every:
-            for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
-                raise InputError(
-                    sheet.place(self.column, row), self.column.cells[row], f"must be {quantity.bounds()}",
-                    "Correct the value or the unit of its column",
-                )  # fmt: skip
-        return values
+def _read(sheet: "Sheet", column: "SheetColumn", paths: Sequence[str]) -> Array:
+    """Cells of a column in SI, shape (n,), within the bounds of every entry that it drives."""
+    every = [quantities()[path] for path in paths]
+    values = sheet.si(column, every[0].unit, sheet.path)
+    for quantity in every:
+        for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
+            raise InputError(
+                sheet.place(column, row), column.cells[row], f"must be {quantity.bounds()}",
+                "Correct the value or the unit of its column",
+            )  # fmt: skip
+    return values
 
 
-def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> _Driven | None:
-    """What a column such as ``C [mm]`` drives, None if it names the rows."""
+def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tuple[str, ...]:
+    """Entries that a column such as ``C [mm]`` drives, none if it names the rows."""
     numbers = scene.numeric_paths()
     of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
     named = {**SHORT_NAMES, **of_study}
     paths = tuple(path for path in named.get(column.name, (column.name,)) if path in numbers)
     if not paths:
         if column.name.lower() in LABELS or sheet.is_text(column):
-            return None
+            return ()
         if re.search(r"[\s\[\]]", column.name):
-            raise InputError(
-                key,
-                column.heading,
-                "is not a column name",
-                'Write a name, and its unit as in "C [mm]"',
-            )
+            remedy = 'Write a name, and its unit as in "C [mm]"'
+            raise InputError(key, column.heading, "is not a column name", remedy)
         remedy = nearest(column.name, (*named, *numbers))
         raise InputError(
             key, column.name, "is neither a variable nor a number of this scene", remedy
         )
-    return _Driven(paths, column)
+    return paths

@@ -57,7 +57,7 @@ class Scene(ConsistentTables):
         return {
             **cited,
             **read,
-            "scene": self.text or self.to_toml(),
+            "scene": self.text,
             "scene_hash": self.hash,
             **about,
         }
@@ -88,7 +88,9 @@ class Scene(ConsistentTables):
 
     @property
     def text(self) -> str:
-        """The TOML text this scene came from, after a comment line for each change made to it."""
+        """The TOML text this scene came from, or that says it where entries were replaced, or that came as a mapping."""
+        if not self._text:
+            self._text = self.to_toml()
         return self._text
 
     def to_toml(self) -> str:
@@ -148,8 +150,6 @@ class Scene(ConsistentTables):
             check_path(path)
             content = entry_replaced(content, path, value)
         result = scene_of(Scene, content, self)
-        notes = "".join(f"# changed: {path} = {value!r}\n" for path, value in altered.items())
-        result._text = notes + self.text
         known = {one.entry for one in result._readings}
         tables = tuple(path.rpartition(".")[0] + "." for path in altered)
         result._readings += tuple(  # that what stands beside a change does not alter; files are not opened again
@@ -166,7 +166,6 @@ class Scene(ConsistentTables):
 
 
 def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts: Texts) -> Scene:
-    """A scene from what `Scene.__reduce__` gives."""
     scene = scene_of(Scene, content)
     scene._text, scene._readings, scene._texts = text, readings, texts
     return scene

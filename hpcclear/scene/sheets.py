@@ -39,24 +39,15 @@ AXES = {"time": "s", "angle": "rad"}
 _NAMES = {"time": ("time", "t"), "angle": ("angle", "crank angle", "crankangle", "phi")}
 """Headings of these, in small letters and without signs."""
 _BEGIN = {
-    "angle": (
-        "angle",
-        "deg",
-        "phi",
-        "φ",
-        "crank",
-        "winkel",
-        "kw",
-        "ca",
-        "theta",
-        "θ",
-        "kurbelwinkel",
-    ),
-    "speed": ("speed", "drehzahl", "omega", "n"),
-    "time": ("time", "zeit", "t"),
-    "pressure": ("pressure", "druck", "p_", "p"),
-    "force": ("force", "kraft", "f"),
-    "torque": ("torque", "moment", "drehmoment", "m"),
+    kind: tuple(words.split())
+    for kind, words in {
+        "angle": "angle deg phi φ crank winkel kw ca theta θ kurbelwinkel",
+        "speed": "speed drehzahl omega n",
+        "time": "time zeit t",
+        "pressure": "pressure druck p_ p",
+        "force": "force kraft f",
+        "torque": "torque moment drehmoment m",
+    }.items()
 }
 """How headings begin, in small letters, of columns whose unit says nothing."""
 _BEGINS = re.compile(r"\s*[-+.,0-9\u2212]")

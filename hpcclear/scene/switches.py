@@ -234,9 +234,7 @@ class Off:
                 content = replace(content, path, value)
         if scene.study is not None:
             content["study"] = self._study(scene, content["study"])
-        made = scene_of(Scene, content, scene)
-        made._text = scene.text
-        return made
+        return scene_of(Scene, content, scene)
 
     def _study(self, scene: Scene, content: Content) -> Content:
         """The study's table without the paths that are gone, nor names that drive nothing."""

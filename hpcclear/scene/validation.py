@@ -231,7 +231,6 @@ def _check_depth(content: Mapping[str, object]) -> None:
 
 
 def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
-    """A pydantic error as an InputError."""
     location = _untagged(error["loc"], error["type"])
     said = error.get("ctx", {}).get("error")
     if isinstance(said, InputError):
@@ -271,7 +270,6 @@ def _wrong(
 
 
 def _unit(path: str) -> str:
-    """The unit of an entry in SI, "" for none."""
     found = quantities().get(path)
     return found.unit if found else ""
 

@@ -330,7 +330,6 @@ def _of_input(row: Content) -> Quantity:
 
 
 def _same_length(cost: Sequence[object], options: Sequence[object]) -> None:
-    """An error for validators unless there is a cost for each option."""
     if len(cost) != len(options):
         raise invalid(
             f"{len(cost)} costs for {len(options)} options", "Give each option a cost", "cost"

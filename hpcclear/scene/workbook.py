@@ -343,7 +343,6 @@ class _Page:
         row += [*[""] * (missing - 1), text]
 
     def _plain(self) -> str:
-        """What the cell says."""
         raw, formats = (self.value or "").strip(), self.book.formats
         if self.formula is not None and not raw and (self.value is None or self.kind != "str"):
             raise InputError(

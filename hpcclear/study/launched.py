@@ -43,7 +43,7 @@ def launch(
     """
     program = _mpiexec(ranks)
     content = {
-        "text": scene.text or scene.to_toml(),
+        "text": scene.text,
         "directory": str(directory),
         "fresh": fresh,
         "style": "log" if progress_style == "auto" else progress_style,

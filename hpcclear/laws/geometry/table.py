@@ -75,7 +75,6 @@ def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
 
 
 def _energy(depths: np.ndarray, forces: np.ndarray, cubics: np.ndarray, slope: float) -> str:
-    """Its integral."""
     terms = [
         f"s{k} * ({f!r} + s{k} * ({m / 2!r} + s{k} * ({c2 / 3!r} + s{k} * {c3 / 4!r})))"
         for k, (f, (c3, c2, m, _)) in enumerate(

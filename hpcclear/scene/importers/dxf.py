@@ -124,7 +124,6 @@ def drawing_of(file: File) -> Drawing:
 
 
 def _read(file: File) -> tuple[int, list[_Entity]]:
-    """$INSUNITS, and the entities of the model."""
     data = file.data
     if data.startswith(b"AutoCAD Binary DXF"):
         file.refuse(file.path.name, "is a binary DXF drawing", "Save it as ASCII DXF")
@@ -239,7 +238,6 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
 
 
 def _add(body: _Body, one: _Entity, file: File) -> None:
-    """Points and lines of an entity."""
     places = one.places(10, file)
     if one.kind == "LINE":
         places += one.places(11, file)

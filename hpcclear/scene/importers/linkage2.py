@@ -47,8 +47,6 @@ def begins(data: bytes) -> bool:
 
 @dataclass
 class _Connector:
-    """A connector of the document."""
-
     row: ElementTree.Element
     name: str
     x: float

@@ -29,8 +29,6 @@ those that are welded to others and stand in the row of the whole."""
 
 
 class _Joint(NamedTuple):
-    """A joint of a project."""
-
     key: str
     name: str
     x: float
@@ -115,7 +113,7 @@ def _project(query: str, file: File) -> Drawing:
     size = file.scale(to_si(f"1 {stated}", "m") if stated else None, stated)
     forces = [row for row in rest[second + 1 : -1] if row]
     notes = [f"Not read: {len(forces)} forces of the project"] if forces else []
-    return _drawing(*_split(joints, links), speed, size, file, notes)
+    return _drawing(joints, links, speed, size, file, notes)
 
 
 def _ends(rest: Sequence[str], file: File) -> tuple[int, int]:
@@ -194,18 +192,16 @@ def _table(text: str, file: File) -> Drawing:
     left = [f"{count} {words}" for kind, words in kinds if (count := len(rows.get(kind, [])[1:]))]
     if left:
         notes.append(f"Not read: {', '.join(left)}")
-    return _drawing(*_split(joints, links), 0.0, file.scale(None, ""), file, notes)
+    return _drawing(joints, links, 0.0, file.scale(None, ""), file, notes)
 
 
 def _ids(row: Sequence[str], place: int, file: File) -> tuple[str, ...]:
-    """Ids of a cell, of joints or of links."""
     if len(row) <= place:
         file.refuse(",".join(row)[:40], "is no row of a link")
     return tuple(one for one in row[place].split("|") if one)
 
 
 def _joint_of(row: Sequence[str], file: File) -> _Joint:
-    """A joint of the table."""
     if len(row) < 9:
         file.refuse(",".join(row)[:40], "is no joint")
     x, y, angle = (
@@ -222,24 +218,31 @@ def _joint_of(row: Sequence[str], file: File) -> _Joint:
     return _Joint(row[0], row[1], x, y, flags, math.radians(angle), speed=speed)
 
 
-def _split(joints: Sequence[_Joint], links: Sequence[_Link]) -> tuple[list[_Joint], list[_Link]]:
-    """Sliders that are one joint as earlier projects have them: a pin, and a joint of the line that a block connects with it.
+def _sliders(joints: Sequence[_Joint], links: Sequence[_Link], file: File) -> list[_Joint]:
+    """Sliders of earlier projects as newer ones have them: one joint, for a pin and the joint of a line that a block connects.
 
-    A pin of a block stands still or is driven where its line does.
+    A pin of a block stands still where its line does.
     """
-    made, blocks = [], []
-    within = {key for link in links if link.is_block for key in link.joints}
-    for one in joints:
-        if one.flags & _PRISMATIC and one.key not in within:
-            grounded = 0 if one.slot else _GROUNDED
-            line = one._replace(key=f"line {one.key}", flags=(one.flags | grounded) & ~_WELDED)
-            blocks.append(_Link(f"block {one.key}", "", True, (one.key, line.key)))
-            made += [one._replace(flags=one.flags & _WELDED, slot=()), line]
-        elif one.key in within and not one.flags & _PRISMATIC:
-            made.append(one._replace(flags=one.flags & ~_GROUNDED))
-        else:
-            made.append(one)
-    return made, [*links, *blocks]
+    made, lines = {one.key: one for one in joints}, set[str]()
+    for link in links:
+        if not link.is_block:
+            continue
+        line = next((made[k] for k in link.joints if made[k].flags & _PRISMATIC), None)
+        if line is None:
+            file.refuse(link.key, "a block has no line that it slides along")
+        lines.add(line.key)
+        for key in link.joints:
+            if key != line.key:
+                flags = made[key].flags & ~_GROUNDED | line.flags & _INPUT | _PRISMATIC
+                made[key] = made[key]._replace(flags=flags, angle=line.angle, slot=line.slot)
+    for one in made.values():
+        if one.flags & _PRISMATIC and one.flags & _INPUT:
+            reason = "is driven along a line, like a hydraulic cylinder"
+            file.refuse(one.name[:40], reason, "Drive a crank there: cylinders are loads here")
+    linked = {key for link in links if not link.is_block for key in link.joints}
+    for key in lines & linked:
+        made[key] = made[key]._replace(flags=made[key].flags & ~_PRISMATIC)
+    return [one for one in made.values() if one.key in linked or one.key not in lines]
 
 
 def _drawing(
@@ -265,18 +268,17 @@ def _drawing(
             bodies |= dict.fromkeys(link.members, bodies[link.key])
             for k in dict.fromkeys(link.joints):
                 own[k].append(bodies[link.key])
-    lines = _lines(links, by_key, file)
     points: list[DrawnPoint] = []
     speeds: dict[str, float] = {}
     alone = []
-    for one in joints:
+    for one in _sliders(joints, links, file):
+        slides = one.flags & _PRISMATIC
         if not own[one.key]:
-            if not one.flags & _PRISMATIC:
-                alone.append(one.name or one.key)
+            alone += [] if slides else [one.name or one.key]
             continue
         if one.flags & _INPUT:
             speeds[own[one.key][0]] = one.speed or speed
-            if not one.flags & _GROUNDED or one.key in lines:
+            if not one.flags & _GROUNDED:
                 file.refuse(
                     one.name[:40],
                     "the input is not on the ground",
@@ -286,10 +288,12 @@ def _drawing(
                 notes.append(
                     f"Input {one.name} turns {own[one.key][0]}, the first of {listed(own[one.key])}"
                 )
-        pins = (GROUND, *own[one.key]) if one.flags & _GROUNDED else tuple(own[one.key])
+        pins = (
+            (GROUND, *own[one.key]) if one.flags & _GROUNDED and not slides else tuple(own[one.key])
+        )
         name = given.given(one.name, one.key)
         point = DrawnPoint(name, round(size * one.x, 12), round(size * one.y, 12), pins)
-        points.append(_sliding(point, one, lines.get(one.key), by_key, bodies, file))
+        points.append(_sliding(point, one, by_key, bodies, file) if slides else point)
     if alone:
         notes.append(f"Not read: joints without a link: {listed(alone)}")
     if not all(speeds.values()):
@@ -301,41 +305,19 @@ def _drawing(
     )
 
 
-def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], file: File) -> dict[str, _Joint]:
-    """The joint that has the line of each pin that slides."""
-    found: dict[str, _Joint] = {}
-    for link in links:
-        if not link.is_block:
-            continue
-        line = next((joints[k] for k in link.joints if joints[k].flags & _PRISMATIC), None)
-        if line is None:
-            file.refuse(link.key, "a block has no line that it slides along")
-        if line.flags & _INPUT:
-            reason = "is driven along a line, like a hydraulic cylinder"
-            file.refuse(line.name[:40], reason, "Drive a crank there: cylinders are loads here")
-        found |= {k: line for k in link.joints if k != line.key}
-    return found
-
-
 def _sliding(
     point: DrawnPoint,
     joint: _Joint,
-    line: _Joint | None,
     joints: Mapping[str, _Joint],
     bodies: Mapping[str, str],
     file: File,
 ) -> DrawnPoint:
-    """The point with its line, if it slides; a welded joint keeps its own link from turning."""
-    if line is None:
-        return point
-    angle, guide = line.angle, GROUND
-    if line.slot:
-        ends = [joints.get(k) for k in line.slot[1:3]]
-        if line.slot[0] not in bodies or len(ends) < 2 or None in ends:
-            file.refuse(line.name, "slides along a link that is not in the file")
-        first, second = ends
-        assert first is not None
-        assert second is not None
-        guide, angle = bodies[line.slot[0]], math.atan2(second.y - first.y, second.x - first.x)
+    """The point with its line; a welded joint keeps its own link from turning."""
+    angle, guide = joint.angle, GROUND
+    if joint.slot:
+        first, second = [*(joints.get(k) for k in joint.slot[1:3]), None, None][:2]
+        if joint.slot[0] not in bodies or first is None or second is None:
+            file.refuse(joint.name, "slides along a link that is not in the file")
+        guide, angle = bodies[joint.slot[0]], math.atan2(second.y - first.y, second.x - first.x)
     block = point.bodies[-1] if joint.flags & _WELDED else ""
     return point._replace(slide=angle, guide=guide, block=block)
