@@ -1,10 +1,6 @@
-"""Compiled functions that come from this package's own cache on disk, without what only compiling needs.
+"""Functions of statistics that Numba compiles, from this package's own cache on disk.
 
 The folder is this package's alone: of the host process, what Numba keeps where and compiles for what stays as it is.
-
-Before Numba loads machine code it imports its own library for compiled programs: arrays, strings, random numbers, linear
-algebra; and with code in which a function of that library is written out, the module of that function. That took a third of the
-start of a command, and code that is compiled already calls nothing of it. Numba imports it itself where it compiles.
 """
 
 import pickle
@@ -16,11 +12,10 @@ from typing import TypeVar
 
 from llvmlite import ir
 from numba import config, njit, types
-from numba.core import cgutils, environment
+from numba.core import cgutils
 from numba.core.base import BaseContext
 from numba.core.caching import Cache, IndexDataCacheFile, NullCache
 from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.typing import Signature
 from numba.extending import intrinsic, lower_builtin, overload, register_jitable, type_callable
@@ -34,14 +29,14 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 @contextmanager
-def _set(name: str, value: object, owner: object = config) -> Iterator[None]:
+def _set(name: str, value: object) -> Iterator[None]:
     """Have a setting of Numba inside the block, and the host's own behind it."""
-    before = getattr(owner, name)
-    setattr(owner, name, value)
+    before = getattr(config, name)
+    setattr(config, name, value)
     try:
         yield
     finally:
-        setattr(owner, name, before)
+        setattr(config, name, before)
 
 
 def _prepare() -> None:
@@ -60,29 +55,6 @@ def _prepare() -> None:
 def features_in_use() -> str:
     """Features of the processor that Numba compiles for, as LLVM names them."""
     return str(cpu_target.target_context.codegen()._tm_features)
-
-
-def _environment(module: str, constants: list[object], name: str) -> environment.Environment:
-    """Make what machine code finds its module and its Python objects by. In place of `environment._rebuild_env`.
-
-    Of Numba's own functions without such objects only the name of the module is used.
-    """
-    if constants or not module.startswith("numba.") or environment.lookup_environment(name):
-        return _usual_environment(module, constants, name)
-    made = environment.Environment({"__name__": module})
-    made.env_name = name
-    environment.Environment._memo[name] = made  # as Numba does: one for each name
-    return made
-
-
-_usual_environment = getattr(environment, "_rebuild_env", environment.Environment)
-
-
-def _load_overload(cache: Cache, signature: object, context: object) -> object:
-    """Load the machine code of a signature; None where it is not on disk. In place of `Cache.load_overload`."""
-    rtsys.initialize(context)  # counts of references, which compiled code links to
-    with cache._guard_against_spurious_io_errors(), _set("_rebuild_env", _environment, environment):
-        return cache._load_overload(signature, context)
 
 
 class _Files:
@@ -137,13 +109,11 @@ def _compile(compiled: CPUDispatcher, *signature: object) -> object:
 
 
 def _keep(compiled: CPUDispatcher) -> None:
-    """Give one function a cache, with this way of loading; Numba's own stays where a version of it has other names."""
+    """Give one function a cache of `_Files`."""
     with _set("CACHE_DIR", chosen_folder()), suppress(RuntimeError):  # no place can be written to
         compiled.enable_caching()  # reads the folder
     found = compiled._cache
-    known = hasattr(Cache, "_load_overload") and hasattr(environment, "_rebuild_env")
-    if known and isinstance(found, Cache):
-        found.load_overload = MethodType(_load_overload, found)
+    if isinstance(found, Cache):
         found._cache_file = _Files(found._cache_file)
         found._impl.locator.ensure_cache_path = lambda: None  # `_Files` makes it
 
