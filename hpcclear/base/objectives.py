@@ -157,12 +157,8 @@ class Objective:
         try:
             return float(np.max(row[0]) if self.value is None else self.value(*row))
         except Exception as error:
-            raise InputError(
-                "objective",
-                self.name,
-                f"its value raised {type(error).__name__}: {error}",
-                "Mend it",
-            ) from error
+            reason = f"its value raised {type(error).__name__}: {error}"
+            raise InputError("objective", self.name, reason, "Mend it") from error
 
 
 def arguments(function: Function) -> tuple[str, ...]:

@@ -203,9 +203,8 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
             + (f", or a string with a unit{hint}" if target else ""),
         )
     if unit is None:
-        raise UnitError(
-            "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
-        )
+        reason = "a number in quotes has no unit"
+        raise UnitError(reason, f"Drop the quotes for a number in {shown}")
     return number, unit
 
 
@@ -235,9 +234,8 @@ def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> fl
         remedy = f"Write a finite number in {target or '1'}"
         raise UnitError("the number is too large", remedy) from None
     if upper and not value:
-        raise UnitError(
-            "the number is too small", f"Write 0, or a larger number in {target or '1'}"
-        )
+        reason = "the number is too small"
+        raise UnitError(reason, f"Write 0, or a larger number in {target or '1'}")
     return value
 
 

@@ -88,9 +88,8 @@ def _check_declared(law: Law) -> None:
         raise LawError(f"declares {len(law.kinks)} kinks", "Declare two, or none")  # type: ignore[attr-defined]
     if law.numbers and law.once is None:
         listed = ", ".join(law.numbers)
-        raise LawError(
-            f"declares the numbers {listed} without once", "Declare once, which returns them"
-        )
+        reason = f"declares the numbers {listed} without once"
+        raise LawError(reason, "Declare once, which returns them")
 
 
 @lru_cache(maxsize=256)
@@ -104,9 +103,8 @@ def check_parameters(law: Law) -> None:
         if not isinstance(one, Parameter):
             raise LawError(f"has the parameter {one!r}", "Write Parameter(name, unit)")
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            raise LawError(
-                f"has a parameter {name!r}, which is not a name", "Write letters, digits and _"
-            )
+            reason = f"has a parameter {name!r}, which is not a name"
+            raise LawError(reason, "Write letters, digits and _")
         if names.count(name) > 1:
             raise LawError(f"declares the parameter {name!r} twice", "Give one another name")
         unit_of(one.unit, name)
@@ -120,10 +118,8 @@ def check_shape(law: Law) -> None:
     own = {one.name for one in law.parameters}
     given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
     for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
-        raise LawError(
-            f"has a parameter {name!r}, a name reserved for numbers of the joint",
-            "Give it another name",
-        )
+        reason = f"has a parameter {name!r}, a name reserved for numbers of the joint"
+        raise LawError(reason, "Give it another name")
     functions = {**law.functions(), **{f.__name__: f for f in law.afterwards()}}
     for title, function in functions.items():
         for name in law.arguments(function):
@@ -133,10 +129,8 @@ def check_shape(law: Law) -> None:
                     f"Declare it as a parameter, or in numbers. Known are {', '.join(sorted(given))}",
                 )
     if len(law.read) > LAW_NUMBERS:
-        raise LawError(
-            f"reads {len(law.read)} numbers, more than {LAW_NUMBERS}",
-            "Compute more of them in once",
-        )
+        reason = f"reads {len(law.read)} numbers, more than {LAW_NUMBERS}"
+        raise LawError(reason, "Compute more of them in once")
     if isinstance(law, ContactLaw) and law.elastic is not None:
         for name in {"rate", "impact_speed", "inverse_impact_speed"} & {
             *law.arguments(law.elastic)
@@ -161,10 +155,8 @@ def check_units(law: Law, values: Mapping[str, object]) -> None:
             reason = f"{title} is not finite"
             raise LawError(reason, "Correct the formula, or the parameters") from None
         except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
-            raise LawError(
-                f"{title} does not fit its units: {error}",
-                "Correct the formula, or the unit of a parameter",
-            ) from None
+            reason = f"{title} does not fit its units: {error}"
+            raise LawError(reason, "Correct the formula, or the unit of a parameter") from None
         except LawError:
             raise
         except (TypeError, ValueError, ArithmeticError, LookupError, NameError) as error:
@@ -217,9 +209,8 @@ def _in_unit(law: Law, found: Quantity, title: str, unit: str) -> Quantity:
         if isinstance(found, complex):
             raise LawError(f"{title} has no real value", "Correct the formula")
         if isinstance(found, bool) or not isinstance(found, int | float):
-            raise LawError(
-                f"{title} returns {type(found).__name__}, which is no number", "Correct it"
-            )
+            reason = f"{title} returns {type(found).__name__}, which is no number"
+            raise LawError(reason, "Correct it")
         found = registry().Quantity(found, own if found == 0 else "")
     return found.to(own)
 
@@ -230,9 +221,8 @@ def check_numbers(law: Law, values: Mapping[str, object]) -> None:
     given = sample_numbers(law, {**TYPICAL, **values})
     for name in law.numbers:
         if not np.isfinite(np.asarray(given[name], float)).all():
-            raise LawError(
-                f"{name}, computed once, is not finite", "Correct once, or the parameters"
-            )
+            reason = f"{name}, computed once, is not finite"
+            raise LawError(reason, "Correct once, or the parameters")
     if isinstance(law, ContactLaw):
         _check_contact(law, given)
     else:
@@ -258,15 +248,12 @@ def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
 
     bad = ~np.isfinite(force)
     if bad.any():
-        raise LawError(
-            f"the force is not finite {where(bad)}", "Correct the formula, or the parameters"
-        )
+        reason = f"the force is not finite {where(bad)}"
+        raise LawError(reason, "Correct the formula, or the parameters")
     pulls = (force < 0.0) & (rate >= 0.0)
     if pulls.any():
-        raise LawError(
-            f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}",
-            "A contact under compression must not pull",
-        )
+        reason = f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}"
+        raise LawError(reason, "A contact under compression must not pull")
     # what counts is the force that the kernel applies: it does not pull
     applied = np.maximum(force, 0.0)
     creates = (rate > 0.0) & (applied[:, ::-1] > (1.0 + ROUNDING) * applied)
@@ -280,10 +267,8 @@ def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
     nothing = {**given, **varying, "depth": 0.0 * depth[:1]}
     touching = np.abs(np.broadcast_to(force_of(law, nothing), (1, *shape[1:]))).max()
     if not law.latched and not touching <= TOUCHING * elastic_at(law, DEPTHS, given).max():
-        raise LawError(
-            f"its force is {touching:.3g} N without contact (depth 0)",
-            "Make it vanish with the depth: multiply the damping by the elastic part",
-        )
+        remedy = "Make it vanish with the depth: multiply the damping by the elastic part"
+        raise LawError(f"its force is {touching:.3g} N without contact (depth 0)", remedy)
 
 
 def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) -> None:
@@ -295,14 +280,11 @@ def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) 
         )
     elastic = np.broadcast_to(elastic_at(law, DEPTHS, given), DEPTHS.shape)
     if not np.allclose(elastic, at_rest[:, 0], rtol=SAME, atol=0.0):
-        raise LawError(
-            "elastic differs from the force at a rate of 0",
-            "Correct one of the two, or leave elastic out",
-        )
+        reason = "elastic differs from the force at a rate of 0"
+        raise LawError(reason, "Correct one of the two, or leave elastic out")
     if not (elastic > 0.0).all() or not (np.diff(elastic) > 0.0).all():
-        raise LawError(
-            "the elastic part does not increase with the depth", "The stiffness must be above 0"
-        )
+        reason = "the elastic part does not increase with the depth"
+        raise LawError(reason, "The stiffness must be above 0")
     step = 1e-4 * DEPTHS
     slope = (stored(law, DEPTHS + step, given) - stored(law, DEPTHS - step, given)) / (2.0 * step)
     off = ~np.isclose(slope, elastic, rtol=SAME, atol=1e-12 * elastic.max())
@@ -325,10 +307,8 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     ratio = np.broadcast_to(evaluate(law.ratio, {**given, **varying}), SPEEDS.shape)
     bad = ~np.isfinite(ratio)
     if bad.any():
-        raise LawError(
-            f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s",
-            "Correct the formula, or the parameters",
-        )
+        reason = f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s"
+        raise LawError(reason, "Correct the formula, or the parameters")
     drives = ratio * SPEEDS < -1e-12 * np.abs(ratio * SPEEDS).max()
     if drives.any():
         raise LawError(
@@ -338,9 +318,8 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     if law.deflection is not None:
         rate = np.broadcast_to(evaluate(law.deflection, {**given, **varying}), SPEEDS.shape)
         if not np.isfinite(rate).all():
-            raise LawError(
-                "the rate of deflection is not finite", "Correct the formula, or the parameters"
-            )
+            reason = "the rate of deflection is not finite"
+            raise LawError(reason, "Correct the formula, or the parameters")
 
 
 @lru_cache(maxsize=256)

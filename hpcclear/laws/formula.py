@@ -35,9 +35,8 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     known = {name: name for name in (*VARYING[kind], *JOINT)} | short
     for name, unit in units:
         if name in WORDS or name in known:
-            raise LawError(
-                f"the parameter {name!r} has a name that formulas use", "Give it another name"
-            )
+            reason = f"the parameter {name!r} has a name that formulas use"
+            raise LawError(reason, "Give it another name")
         _check_si(name, unit)
     known |= {name: name for name, _ in units}
     tree = read(formula, LONGEST, WORDS, "K * d**1.5 * (1 + b * v)")

@@ -72,10 +72,8 @@ def check_objective(objective: Objective) -> None:
         function = getattr(objective, title)
         for name in () if function is None else arguments(function):
             if name not in known:
-                raise LawError(
-                    f"{title} uses {name!r}, which is not known",
-                    f"There are {', '.join(sorted(known))}",
-                )
+                reason = f"{title} uses {name!r}, which is not known"
+                raise LawError(reason, f"There are {', '.join(sorted(known))}")
     numbers = {name: np.array([1.0, 2.0]) if FIELDS[name].per else 1.5 for name in RECORDED}
     if objective.rate is not None:
         text_of_rate(objective)
@@ -116,9 +114,8 @@ def _check_value(objective: Objective, numbers: Mapping[str, object]) -> None:
     try:
         found = float(objective.value(*(numbers[name] for name in names)))
     except Exception as error:  # noqa: BLE001 - of a function that nobody here wrote
-        raise LawError(
-            f"its value raised {type(error).__name__}: {error}", "Return one number"
-        ) from None
+        reason = f"its value raised {type(error).__name__}: {error}"
+        raise LawError(reason, "Return one number") from None
     if not np.isfinite(found):
         raise LawError("its value is not finite", "Mend the formula")
     quantities = {name: registry().Quantity(numbers[name], units[name]) for name in names}

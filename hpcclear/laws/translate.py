@@ -38,9 +38,8 @@ def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
     except (OSError, TypeError, SyntaxError, IndexError):
         raise LawError("its source cannot be read", "Write it with def in a file") from None
     if not isinstance(tree, ast.FunctionDef):
-        raise LawError(
-            "is not a function written with def", "Write it with def, at the top of the file"
-        )
+        reason = "is not a function written with def"
+        raise LawError(reason, "Write it with def, at the top of the file")
     return tree
 
 
@@ -81,9 +80,8 @@ class _Writer:
         tree = definition_of(function)
         arguments = [one.arg for one in tree.args.args]
         if tree.args.vararg or tree.args.kwarg or tree.args.kwonlyargs or tree.args.defaults:
-            raise LawError(
-                f"{self.title} has arguments with defaults or stars", "Name plain arguments"
-            )
+            reason = f"{self.title} has arguments with defaults or stars"
+            raise LawError(reason, "Name plain arguments")
         self.globals = {**vars(builtins), **getattr(function, "__globals__", {})}
         closed = inspect.getclosurevars(function).nonlocals if function.__closure__ else {}  # type: ignore[attr-defined]
         self.globals |= closed
@@ -220,9 +218,8 @@ class _Writer:
 
     def constant(self, name: str) -> str:
         if name not in self.globals:
-            raise LawError(
-                f"{self.title} uses {name!r}, which is not defined", "Make it an argument"
-            )
+            reason = f"{self.title} uses {name!r}, which is not defined"
+            raise LawError(reason, "Make it an argument")
         return self.number(self.globals[name])
 
     def value(self, node: ast.expr) -> Any:
@@ -275,10 +272,8 @@ class _Writer:
             return self.let(f"{WORDS[name]}({', '.join(texts)})")
         if isinstance(function, FunctionType):
             return self.let(f"{self.helper(function)}({', '.join(texts)})")
-        raise LawError(
-            f"{self.title} calls {ast.unparse(called)!r}, which the kernel does not provide",
-            f"Use one of: {', '.join(WORDS)}",
-        )
+        reason = f"{self.title} calls {ast.unparse(called)!r}, which the kernel does not provide"
+        raise LawError(reason, f"Use one of: {', '.join(WORDS)}")
 
     def helper(self, function: FunctionType) -> str:
         """The name of another function of the law's, written before this one."""

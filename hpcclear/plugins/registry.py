@@ -113,15 +113,13 @@ class Registry(Generic[Plugin]):
     def _of_file(self, name: str, module: str, attribute: str, texts: Mapping[str, str]) -> object:
         if module not in texts:
             remedy = f"Write {module}.py into the folder of the scene file. {self._known(name)}"
-            raise InputError(
-                self.kind, name, f"there is no {module}.py beside the scene file", remedy
-            )
+            reason = f"there is no {module}.py beside the scene file"
+            raise InputError(self.kind, name, reason, remedy)
         made = run_source(module, texts[module])
         if not hasattr(made, attribute):
             public = tuple(one for one in vars(made) if not one.startswith("_"))
-            raise InputError(
-                self.kind, name, f"{module}.py has no {attribute}", nearest(attribute, public)
-            )
+            reason = f"{module}.py has no {attribute}"
+            raise InputError(self.kind, name, reason, nearest(attribute, public))
         return getattr(made, attribute)
 
     def _installed(self, name: str) -> object:

@@ -128,10 +128,9 @@ def run_source(module: str, text: str) -> ModuleType:
         spec.loader.exec_module(made)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise InputError(
-            f"{module}.py", _said(error, path), "reading the file raised this error",
-            "Correct it; a plug-in is one file, which may import installed packages",
-        ) from error  # fmt: skip
+        reason = "reading the file raised this error"
+        remedy = "Correct it; a plug-in is one file, which may import installed packages"
+        raise InputError(f"{module}.py", _said(error, path), reason, remedy) from error
     return made
 
 

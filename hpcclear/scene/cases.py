@@ -54,9 +54,8 @@ class Goal(Table):
 
     def _check(self) -> None:
         if (self.statistic is None) == (self.formula is None):
-            raise invalid(
-                "either a statistic or a formula is expected here", 'Write statistic = "mean", say'
-            )
+            reason = "either a statistic or a formula is expected here"
+            raise invalid(reason, 'Write statistic = "mean", say')
         if self.formula is not None:
             with at("formula", self.formula[:80]):
                 names_in(self.formula)
@@ -201,34 +200,23 @@ class Case(Table):
         if not NAME.fullmatch(self.name):  # it stands in names of files, figures and pages
             raise invalid("is not a name", "Use a letter, then letters, digits or _", key="name")
         if not self.random:
-            raise invalid(
-                "a case without random inputs has no standard deviation to minimise",
-                "Name some",
-                "random",
-            )
+            reason = "a case without random inputs has no standard deviation to minimise"
+            raise invalid(reason, "Name some", "random")
         if len(set(self.random)) < len(self.random):
             raise invalid("a random input is named twice", "Remove one", key="random")
         rows = self.goals
         if not rows:
-            raise invalid(
-                "a case needs an objective",
-                'Add one, such as "mean" or { formula = "m2 + m3" }',
-                "objectives",
-            )
+            remedy = 'Add one, such as "mean" or { formula = "m2 + m3" }'
+            raise invalid("a case needs an objective", remedy, "objectives")
         if len(rows) > len(ENDS):
-            raise invalid(
-                f"with more than {len(ENDS)} objectives nearly every design is on the front",
-                "Use constraints for some of them, or combine some in one formula",
-                "objectives",
-            )
+            reason = f"with more than {len(ENDS)} objectives nearly every design is on the front"
+            remedy = "Use constraints for some of them, or combine some in one formula"
+            raise invalid(reason, remedy, "objectives")
         for k, goal in enumerate(rows):
             if any(goal.same_as(other) for other in rows[:k]):
-                raise invalid(
-                    "is an objective already",
-                    "Remove it, or name another objective",
-                    f"objectives.{k}",
-                    goal.formula or goal.statistic,
-                )
+                reason = "is an objective already"
+                remedy = "Remove it, or name another objective"
+                raise invalid(reason, remedy, f"objectives.{k}", goal.formula or goal.statistic)
 
     @property
     def goals(self) -> tuple[Goal, ...]:

@@ -69,9 +69,8 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
             first = last = now
         if (day is None, zoned) != (first[0] is None, first[3]):
             reason = "is a time of another kind than those above it"
-            raise InputError(
-                where(row), cell, reason, "Write date, time and zone of each row in one way"
-            )
+            remedy = "Write date, time and zone of each row in one way"
+            raise InputError(where(row), cell, reason, remedy)
         if day is None and last[1] - whole > (period := _period(found)) / 2:
             gone += period
         days = (day or 0) - (first[0] or 0)
@@ -87,16 +86,14 @@ def _period(found: re.Match[str] | None) -> int:
 
 def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> Moment:
     if found is None or not cell.strip():
-        raise InputError(
-            where, cell, "is no clock time or date", "Write it as 2026-03-01 12:03:05.2"
-        )
+        reason = "is no clock time or date"
+        raise InputError(where, cell, reason, "Write it as 2026-03-01 12:03:05.2")
     day = None
     if found["date"]:
         day = _day(found["date"], order)
         if day is None:
-            raise InputError(
-                where, cell, f"is no date (read as {order})", "Write it as 2026-03-01 12:03:05.2"
-            )
+            reason = f"is no date (read as {order})"
+            raise InputError(where, cell, reason, "Write it as 2026-03-01 12:03:05.2")
     if found["compact"]:
         clock = [found["compact"][k : k + 2] for k in (0, 2, 4)]
     elif found["hour"]:
@@ -172,9 +169,8 @@ def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
             datetime.date.fromordinal(_day(found["date"], one) or 1).isoformat() for one in fits
         ]
         named = [f"{reading} ({order})" for reading, order in zip(readings, fits, strict=True)]
-        raise InputError(
-            where(row), cells[row], f"may be {' or '.join(named)}", f"Write dates as {readings[0]}"
-        )
+        reason = f"may be {' or '.join(named)}"
+        raise InputError(where(row), cells[row], reason, f"Write dates as {readings[0]}")
     return (fits or orders)[0]
 
 

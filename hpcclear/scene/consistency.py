@@ -40,9 +40,7 @@ class ConsistentTables(SceneTables):
         for table in ("drive", "joints"):
             if kind == "planar" and table in data:
                 own = "drives" if table == "drive" else table
-                raise invalid(
-                    "belongs to a slider-crank", f"Write [mechanism.{own}.NAME]", key=table
-                )
+                raise invalid("belongs to a slider-crank", f"Write [mechanism.{own}.NAME]", table)
         return {**data, "mechanism": {"kind": kind, **mechanism}}
 
     @model_validator(mode="before")
@@ -99,11 +97,9 @@ class ConsistentTables(SceneTables):
         if self.joints.guide is None:
             return
         if self.slider_crank.slider.inertia is None:
-            raise invalid(
-                "a slider in a guide with clearance can turn, so it needs an inertia",
-                "Write its moment of inertia about its pin in kg m2",
-                "mechanism.slider.inertia",
-            )
+            reason = "a slider in a guide with clearance can turn, so it needs an inertia"
+            remedy = "Write its moment of inertia about its pin in kg m2"
+            raise invalid(reason, remedy, "mechanism.slider.inertia")
         (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
         with self._named_as_written("joints.guide"):
             guide.check()
@@ -136,11 +132,9 @@ class ConsistentTables(SceneTables):
             remedy = f'Add {law}, or make the joints ideal (kind = "ideal")'
             raise invalid("a clearance joint needs a contact law", remedy, "effects.contact")
         if not clearance and self.effects.friction.law != "none":
-            raise invalid(
-                "friction acts in joints with clearance, but all joints are ideal",
-                'Set effects.friction.law = "none", or give a joint kind = "clearance"',
-                "effects.friction.law",
-            )
+            reason = "friction acts in joints with clearance, but all joints are ideal"
+            remedy = 'Set effects.friction.law = "none", or give a joint kind = "clearance"'
+            raise invalid(reason, remedy, "effects.friction.law")
 
     def _check_profiles(self) -> None:
         """An angular profile needs dry joints of rigid bodies."""
@@ -164,11 +158,8 @@ class ConsistentTables(SceneTables):
         if len(set(self._contacts_in(chosen))) < len(self._contacts_in(chosen)):
             raise invalid("a joint is named twice", "Name each once", key=key)
         if self.study is not None and self.numerics.objective is not None:
-            raise invalid(
-                "a study names its objective itself",
-                "Write study.objective instead",
-                "numerics.objective",
-            )
+            reason = "a study names its objective itself"
+            raise invalid(reason, "Write study.objective instead", "numerics.objective")
         if chosen and not self.objective.of_joints:
             raise invalid(
                 f'study.objective = "{self.objective.name}" is of no joint',
@@ -185,19 +176,15 @@ class ConsistentTables(SceneTables):
             raise invalid(why, remedy, key="numerics.objective_joints")
         named = self.numerics.objective if self.study is None else self.study.objective
         if named not in (None, MEAN_GAP.name):
-            raise invalid(
-                f"{why}, and the objective is {named}",
-                "Remove numerics.target_error, and raise numerics.averaged_revolutions",
-                "numerics.target_error",
-            )
+            remedy = "Remove numerics.target_error, and raise numerics.averaged_revolutions"
+            raise invalid(f"{why}, and the objective is {named}", remedy, "numerics.target_error")
 
     def _check_pressures(self) -> None:
         for one in () if self.effects.has_pressure else self._objectives():
             if not one.asks.isdisjoint(WIDEST):
-                raise invalid(
-                    f"{one.name} needs a geometry of contact with a pressure",
-                    'Add geometry = "line" or "liner" to effects.contact', self.objective_key, one.name,
-                )  # fmt: skip
+                reason = f"{one.name} needs a geometry of contact with a pressure"
+                remedy = 'Add geometry = "line" or "liner" to effects.contact'
+                raise invalid(reason, remedy, self.objective_key, one.name)
 
     def _check_levels(self) -> None:
         bands = self.bands()
@@ -205,9 +192,7 @@ class ConsistentTables(SceneTables):
         if bands and not self.clearance_joints():
             raise invalid("force levels need a joint with clearance", "Remove it", key)
         if bands and self.numerics.target_error is not None:
-            raise invalid(
-                "force levels are those of a given number of revolutions",
-                "Remove numerics.target_error, and set averaged_revolutions", key,
-            )  # fmt: skip
+            reason = "force levels are those of a given number of revolutions"
+            raise invalid(reason, "Remove numerics.target_error, and set averaged_revolutions", key)
         if len(bands) > MAX_BANDS:
             raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)

@@ -34,29 +34,20 @@ class Correlation(Table):
     def _check(self) -> None:
         count = len(self.inputs)
         if count < 2 or len(set(self.inputs)) < count:
-            raise invalid(
-                "a list of two or more different inputs is expected here", "Name them", "inputs"
-            )
+            reason = "a list of two or more different inputs is expected here"
+            raise invalid(reason, "Name them", "inputs")
         if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
-            raise invalid(
-                f"{count} inputs need {count} rows of {count} numbers",
-                "Write a row for each input",
-                "matrix",
-            )
+            reason = f"{count} inputs need {count} rows of {count} numbers"
+            raise invalid(reason, "Write a row for each input", "matrix")
         entries = np.array(self.matrix)
         if (entries != entries.T).any() or (entries.diagonal() != 1.0).any():
-            raise invalid(
-                "a correlation matrix is symmetric, with ones along its diagonal",
-                "Correct the entries that differ",
-                "matrix",
-            )
+            reason = "a correlation matrix is symmetric, with ones along its diagonal"
+            raise invalid(reason, "Correct the entries that differ", "matrix")
         least = float(np.linalg.eigvalsh(self.normal(self.inputs)).min())
         if least < LEAST_EIGENVALUE:
-            raise invalid(
-                f"the matrix is not positive definite: its lowest eigenvalue is {least:.2g}",
-                f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say",
-                "matrix",
-            )
+            reason = f"the matrix is not positive definite: its lowest eigenvalue is {least:.2g}"
+            remedy = f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say"
+            raise invalid(reason, remedy, "matrix")
 
     def normal(self, names: Sequence[str]) -> Array:
         """Correlations of the normals behind some of its inputs, shape (n, n)."""

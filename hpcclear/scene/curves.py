@@ -41,10 +41,8 @@ class Pairs(Converted):
     def convert(self, value: object) -> Any:
         """A number, or a tuple of pairs in SI; an error for validators where it is none."""
         if isinstance(value, Mapping) and "file" in value:
-            raise invalid(
-                "files are read where a scene is loaded, and this came another way",
-                "Load a scene with it, or give pairs",
-            )
+            reason = "files are read where a scene is loaded, and this came another way"
+            raise invalid(reason, "Load a scene with it, or give pairs")
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
         remedy = (
@@ -98,11 +96,8 @@ def check_period(pairs: Rows, turns: int, key: str) -> None:
     span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
     length = "one turn" if turns == 1 else f"{turns} turns"
     if span > turn * (1 + 1e-12):
-        raise invalid(
-            f"the table is longer than {length}",
-            f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}",
-            key=key,
-        )
+        remedy = f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}"
+        raise invalid(f"the table is longer than {length}", remedy, key)
     if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
         raise invalid(
             f"the curve repeats every {'turn' if turns == 1 else length}, but its last value differs from its first",

@@ -147,9 +147,8 @@ def _rows(path: Path, what: str, lines: Lines, separator: str) -> Rows:
             count += len(cells)
             if count > MOST_CELLS:
                 reason = f"has more than {MOST_CELLS} cells"
-                raise InputError(
-                    what, str(path), reason, "Keep the rows and columns that are needed"
-                )
+                remedy = "Keep the rows and columns that are needed"
+                raise InputError(what, str(path), reason, remedy)
     except csv.Error as error:
         raise InputError(what, str(path), f"cannot be read ({error})", _SAVE) from None
     for line, cells in rows:
@@ -252,16 +251,14 @@ def columns_of(
     if bare and not headed:
         header, body = [str(1 + k) for k in range(width)], rows[first:]
     elif bare:
-        raise InputError(
-            f"{path}, line {line}", ", ".join(header)[:200], f"no heading stands above the numbers ({found})",
-            "Write a row of names first, such as m2 [g]",
-        )  # fmt: skip
+        reason = f"no heading stands above the numbers ({found})"
+        remedy = "Write a row of names first, such as m2 [g]"
+        raise InputError(f"{path}, line {line}", ", ".join(header)[:200], reason, remedy)
     sideways = len(header) > 2 and all(map(is_number, header[1:]))
     if sideways and not any(is_number(cells[0]) for _, cells in rows):
-        raise InputError(
-            f"{path}, line {line}", ", ".join(header)[:200], f"the headings stand in the first column ({found})",
-            "Transpose the table, so that they stand in the first row",
-        )  # fmt: skip
+        reason = f"the headings stand in the first column ({found})"
+        remedy = "Transpose the table, so that they stand in the first row"
+        raise InputError(f"{path}, line {line}", ", ".join(header)[:200], reason, remedy)
     units: list[str | None] = [None] * width
     if body and _are_units(body[0][1]):
         units = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]]
@@ -273,9 +270,8 @@ def columns_of(
         for number, one in body
     ]
     if not cells:
-        raise InputError(
-            what, str(path), f"contains no points ({found})", "Write a row for each point or value"
-        )
+        reason = f"contains no points ({found})"
+        raise InputError(what, str(path), reason, "Write a row for each point or value")
     columns = []
     for place, heading in enumerate(header):
         name, unit = parsed_heading(heading)
@@ -304,9 +300,8 @@ def _row(
     count = len(cells) + len(more)
     if len(cells) < len(header) and len(header) > 1 and separator in (",", ""):
         reason = f"has {count} cells instead of {len(header)}"
-        raise InputError(
-            f"{path}, line {line}", ",".join(cells)[:200], reason, "Give each column a value"
-        )
+        remedy = "Give each column a value"
+        raise InputError(f"{path}, line {line}", ",".join(cells)[:200], reason, remedy)
     if any(more) or len(cells) > len(header):
         reason, remedy = f"has {count} cells instead of {len(header)}", "Give each column a value"
         if separator == "," and count == 2 * len(header):

@@ -41,9 +41,8 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
     chosen = study.names if names is None else tuple(names)
     for name in chosen:
         if name not in study.names:
-            raise InputError(
-                "study.variables", name, "is not a study variable", f"Use {', '.join(study.names)}"
-            )
+            reason = "is not a study variable"
+            raise InputError("study.variables", name, reason, f"Use {', '.join(study.names)}")
     reach = _reaches(study, widen)
     bounds = [_bounds(scene, study.variable(name), chosen, reach) for name in chosen]
     lower, upper = (np.array(side, dtype=np.float64) for side in zip(*bounds, strict=True))
@@ -100,12 +99,9 @@ def _bounds(
         light = (mass + mass_ends[0]) * (length + length_ends[0]) ** 2 / 12
         ratios += [(lower * unit + low) / heavy, (upper * unit + high) / light]
     if min(ratios) <= 0:
-        raise InputError(
-            f"study.random.{variable.name}",
-            low,
-            "reduces the smallest inertia of the box to 0 or below",
-            f"Narrow it, or raise study.variables.{variable.name}.ratio",
-        )
+        reason = "reduces the smallest inertia of the box to 0 or below"
+        remedy = f"Narrow it, or raise study.variables.{variable.name}.ratio"
+        raise InputError(f"study.random.{variable.name}", low, reason, remedy)
     return min(ratios), max(ratios)
 
 

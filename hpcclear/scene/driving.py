@@ -224,17 +224,14 @@ class CrankTorque(Table):
     def _check(self) -> None:
         """It has one torque, and a speed that tolerances go by."""
         if self.initial_speed == 0.0 and self.expected_speed is None and not by_interval(self):
-            raise invalid(
-                "is needed where initial_speed = 0: the tolerances and the first step go by it",
-                'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
-                key="expected_speed",
-            )
+            reason = "is needed where initial_speed = 0: the tolerances and the first step go by it"
+            remedy = 'Write about how fast it will turn, such as expected_speed = "1500 rpm"'
+            raise invalid(reason, remedy, "expected_speed")
         remedy = "Write torque, or torque_by_speed = [[speed, torque], ...]"
         check_one_of("torque", self.torque, self.torque_by_speed, remedy)
         if self.torque_by_speed is not None and self.no_load_speed is not None:
-            raise invalid(
-                "torque_by_speed says already how the torque falls", "Remove it", "no_load_speed"
-            )
+            reason = "torque_by_speed says already how the torque falls"
+            raise invalid(reason, "Remove it", "no_load_speed")
 
 
 class PlanarTorque(FreeDriving, CrankTorque):
@@ -310,11 +307,8 @@ class PlanarRunUp(FreeDriving):
     def _check(self) -> None:
         speeds = [speed for _, speed in self.speed_by_time]
         if min(speeds) < 0.0 or min(speeds[1:]) == 0.0:
-            raise invalid(
-                "the speed falls to 0 or below, where no revolution would end",
-                "Give speeds above 0 from the second row on",
-                key="speed_by_time",
-            )
+            reason = "the speed falls to 0 or below, where no revolution would end"
+            raise invalid(reason, "Give speeds above 0 from the second row on", "speed_by_time")
 
 
 PlanarDrive = Annotated[

@@ -77,17 +77,13 @@ class FileCurve(Table):
             key for key in ("bore", "area", "ambient", "pushes") if getattr(self, key) is not None
         ]
         if given not in ([], ["pressure"]) and piston:
-            raise invalid(
-                "belongs to a pressure",
-                f"Remove it, or write pressure in place of {given[0]}",
-                piston[0],
-            )
+            reason = "belongs to a pressure"
+            raise invalid(reason, f"Remove it, or write pressure in place of {given[0]}", piston[0])
         if self.bore is not None and self.area is not None:
             raise invalid("stands beside bore", "Keep one of them", "area")
         if (given == ["pressure"] or piston) and self.bore is None and self.area is None:
-            raise invalid(
-                "is missing: pressures push on a piston", 'Add bore = "42 mm", or area', "bore"
-            )
+            reason = "is missing: pressures push on a piston"
+            raise invalid(reason, 'Add bore = "42 mm", or area', "bore")
 
     @property
     def piston(self) -> float | None:
@@ -140,9 +136,8 @@ def _kind(curve: FileCurve, unit: str, key: str) -> str:
     given = next((kind for kind in _VALUES if getattr(curve, kind) is not None), None)
     kind = given or ("pressure" if curve.piston is not None else own)
     if kind not in (own, "pressure") or (kind == "pressure" and own != "force"):
-        raise InputError(
-            f"{key}.{kind}", getattr(curve, kind), f"this entry is a {own}", f"Write {own} = ..."
-        )
+        reason = f"this entry is a {own}"
+        raise InputError(f"{key}.{kind}", getattr(curve, kind), reason, f"Write {own} = ...")
     return kind
 
 
@@ -165,9 +160,8 @@ def _column(
     )
     column = sheet.column(name, key) if name else sheet.likely(kind, target, key, taken)
     if unit and column.unit and _size(unit, target, key) != _size(column.unit, target, key):
-        raise InputError(
-            key, given, f"the heading {column.heading!r} has the unit {column.unit}", "Remove one of the two"
-        )  # fmt: skip
+        reason = f"the heading {column.heading!r} has the unit {column.unit}"
+        raise InputError(key, given, reason, "Remove one of the two")
     if not unit and not sheet.states_unit(column):
         raise InputError(
             key, given, f"nothing says the unit of the column {column.heading!r} of {sheet.path}",
@@ -184,15 +178,13 @@ def _size(unit: str, target: str, key: str) -> Fraction:
 def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key: str) -> Array:
     gauge = plain_unit(column.unit, "Pa") != column.unit
     if gauge and curve.ambient:
-        raise InputError(
-            f"{key}.ambient", curve.ambient, f"the heading {column.heading!r} is of gauge pressures", 'Write ambient = "0 bar"'
-        )  # fmt: skip
+        reason = f"the heading {column.heading!r} is of gauge pressures"
+        raise InputError(f"{key}.ambient", curve.ambient, reason, 'Write ambient = "0 bar"')
     assert curve.piston is not None  # by validation
     if curve.ambient is None and not gauge:
-        raise InputError(
-            f"{key}.ambient", None, "is missing: nothing says whether these are absolute or gauge pressures",
-            'Add ambient = "1 bar" for absolute, "0 bar" for gauge pressures',
-        )  # fmt: skip
+        reason = "is missing: nothing says whether these are absolute or gauge pressures"
+        remedy = 'Add ambient = "1 bar" for absolute, "0 bar" for gauge pressures'
+        raise InputError(f"{key}.ambient", None, reason, remedy)
     on_slider = key == "effects.slider_load"
     if curve.pushes is not None and not on_slider:
         reason, remedy = "belongs to the load on a slider", "Write direction of this load"
@@ -261,9 +253,8 @@ def with_values(
     for key, row in files_named(content).items():
         file = row["file"]
         if not isinstance(file, str) or not file:
-            raise InputError(
-                f"{key}.file", file, "the name of a table is expected here", "Write it in quotes"
-            )
+            reason = "the name of a table is expected here"
+            raise InputError(f"{key}.file", file, reason, "Write it in quotes")
         made: object
         if key.startswith("study.random."):
             made, shown = _with_values(row, file, key, folder)
@@ -282,9 +273,8 @@ def _with_values(
     if "values" in row:
         raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
     if column is not None and not isinstance(column, str):
-        raise InputError(
-            f"{key}.column", column, "the name of a column is expected here", "Write it in quotes"
-        )
+        reason = "the name of a column is expected here"
+        raise InputError(f"{key}.column", column, reason, "Write it in quotes")
     path = folder / file
     sheet = read(path, f"{key}.file")
     of_numbers = sheet.of_numbers or sheet.columns

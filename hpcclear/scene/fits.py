@@ -199,11 +199,8 @@ class Tolerance(Table):
             raise invalid("is larger than cp", "Write cpk no larger than cp", "cpk")
         off = self.cpk is not None and self.cpk < self.cp
         if off and self.towards is None:
-            raise invalid(
-                "the mean lies off the middle, and nothing says where",
-                'Add towards = "upper" or "lower"',
-                "towards",
-            )
+            reason = "the mean lies off the middle, and nothing says where"
+            raise invalid(reason, 'Add towards = "upper" or "lower"', "towards")
 
     def part(self, limits: SizeLimits | None) -> tolerances.PartSize:
         """Its distribution; `limits` are those of the fit."""

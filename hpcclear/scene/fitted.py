@@ -40,18 +40,16 @@ def with_shares(content: Mapping[str, object]) -> Mapping[str, object]:
             if isinstance(variable, Mapping) and "mean" not in row:
                 others = [row[k] for k in ("half_width", "deviation") if k in row]
                 if not all(map(is_share, others)):
-                    raise invalid(
-                        "is a share of the design's value, and what stands beside it is none",
-                        f"Write both in % or {f'both in {unit}' if unit else 'none of them'}", where, share,
-                    )  # fmt: skip
+                    reason = "is a share of the design's value, and what stands beside it is none"
+                    remedy = f"Write both in % or {f'both in {unit}' if unit else 'none of them'}"
+                    raise invalid(reason, remedy, where, share)
                 content = replace(content, f"study.random.{name}.relative", True)
                 note_share(str(share), unit, "the value that each design has")
                 continue
             middle = row["mean"] if "mean" in row else _number(content, path)
             if middle is None:
-                raise invalid(
-                    f"there is no number at {path}", "Give that entry first", where, share
-                )
+                reason = f"there is no number at {path}"
+                raise invalid(reason, "Give that entry first", where, share)
             with at(where, share):
                 about = Quantity(unit).number(middle)
                 value = abs(about) * Quantity("").number(share)

@@ -158,18 +158,12 @@ class OfContacts(Table):
         own = [name for name in entries if name in type(self).model_fields]
         given = [name for name in own if getattr(self, name) is not None]
         if self.clearance is None and given:
-            raise invalid(
-                "belongs to a joint with clearance",
-                'Add clearance = "0.1 mm" or so, or remove it',
-                given[0],
-            )
+            reason = "belongs to a joint with clearance"
+            raise invalid(reason, 'Add clearance = "0.1 mm" or so, or remove it', given[0])
         for name in own if self.clearance is not None else ():
             if name in (*self.needed, "materials") and name not in given:
-                raise invalid(
-                    "is missing, and a joint with clearance needs it",
-                    "Add it, or remove clearance for a joint without",
-                    name,
-                )
+                reason = "is missing, and a joint with clearance needs it"
+                raise invalid(reason, "Add it, or remove clearance for a joint without", name)
 
 
 class Guide(OfContacts):
@@ -198,11 +192,8 @@ class Guide(OfContacts):
         if self.clearance is None:
             return
         if getattr(self, "friction", None) is not None:
-            raise invalid(
-                "a slide with clearance rubs at its corners, by the friction of all contacts",
-                "Remove it, and write effects.friction",
-                "friction",
-            )
+            reason = "a slide with clearance rubs at its corners, by the friction of all contacts"
+            raise invalid(reason, "Remove it, and write effects.friction", "friction")
         for entry in ("length", "height"):
             size, radius = getattr(self, entry), self.corner_radius
             if radius is not None and 2.0 * radius >= size:

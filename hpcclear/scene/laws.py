@@ -62,10 +62,9 @@ def on_geometry(law: ContactLaw, name: str, rows: Rows | None = None) -> Contact
         known = (SPHERE, *found)
         raise invalid("is not one of the known values", nearest(name, known), "geometry", name)
     if law.factor is None:
-        raise invalid(
-            f"the law {law.name!r} has an elastic force of its own",
-            'Remove geometry, or use a law with damping only, such as "hunt-crossley"', "geometry", name,
-        )  # fmt: skip
+        reason = f"the law {law.name!r} has an elastic force of its own"
+        remedy = 'Remove geometry, or use a law with damping only, such as "hunt-crossley"'
+        raise invalid(reason, remedy, "geometry", name)
     shape = found[name]
     if (shape.of_rows is None) != (rows is None):
         raise invalid(
@@ -179,9 +178,8 @@ class LawTable(Table):
         entry = cls.formula
         text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
-            raise invalid(
-                "the law 'expression' needs a formula", f'Add {entry} = "..."', entry, text
-            )
+            reason = "the law 'expression' needs a formula"
+            raise invalid(reason, f'Add {entry} = "..."', entry, text)
         if not isinstance(units, Mapping) or not all(
             isinstance(one, str) for one in units.values()
         ):
@@ -213,9 +211,8 @@ class LawTable(Table):
             if key in others:
                 whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
                 raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
-            raise invalid(
-                "is not a known key", hint(key) + nearest(key, (*cls.model_fields, *entries)), key
-            )
+            reason = "is not a known key"
+            raise invalid(reason, hint(key) + nearest(key, (*cls.model_fields, *entries)), key)
 
     @classmethod
     def _converted(cls, data: Mapping[str, object], law: Law) -> dict[str, object]:

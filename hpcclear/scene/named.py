@@ -38,25 +38,21 @@ def resolved_paths(data: Mapping[str, object]) -> tuple[str, ...]:
     name = data.get("name")
     if not isinstance(name, str) or not NAME.fullmatch(name) or name in RESERVED:
         reason = "is taken by a result" if name in RESERVED else "is not a name"
-        raise invalid(
-            reason, "Use a letter, then letters, digits or _, and give the path as path = ..."
-        )
+        remedy = "Use a letter, then letters, digits or _, and give the path as path = ..."
+        raise invalid(reason, remedy)
     if "path" in data and "paths" in data:
         raise invalid("path and paths contradict each other", "Keep one of them", key="path")
     given = data.get("paths", data.get("path"))
     key = "path" if "path" in data else "paths"
     if given is None:
         if name not in SHORT_NAMES:
-            raise invalid(
-                "is not one of the known names, so it needs a path",
-                f'Add path = "drive.speed", say; known names are {", ".join(SHORT_NAMES)}',
-            )
+            remedy = f'Add path = "drive.speed", say; known names are {", ".join(SHORT_NAMES)}'
+            raise invalid("is not one of the known names, so it needs a path", remedy)
         return SHORT_NAMES[name]
     paths = texts_in(given)
     if not paths:
-        raise invalid(
-            "a dotted path, or a list of them, is expected here", "Write it in quotes", key
-        )
+        reason = "a dotted path, or a list of them, is expected here"
+        raise invalid(reason, "Write it in quotes", key)
     for path in paths:
         check_known(path, quantities(), "is not a physical number of a scene", key)
     if len(set(paths)) < len(paths):

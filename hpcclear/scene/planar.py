@@ -50,10 +50,8 @@ class BarBending(Table):
 def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
     """An error for validators unless a body that bends is a bar that pins alone hold, at both its ends."""
     if body.length is None:
-        raise invalid(
-            "only a bar can bend, and this body has no length",
-            "Give its length, or leave bending out",
-        )
+        reason = "only a bar can bend, and this body has no length"
+        raise invalid(reason, "Give its length, or leave bending out")
     if body.points:
         raise invalid(
             f"the bar has a further point, {body.points[0].name}, but bending is modelled for its two ends only",
@@ -67,10 +65,8 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
             )
     for row in planar.loads:
         if getattr(row, "body", None) == body.name:
-            raise invalid(
-                f"the torque {row.name} has no point of application on the bar",
-                "Leave bending out, or replace it by two forces",
-            )
+            reason = f"the torque {row.name} has no point of application on the bar"
+            raise invalid(reason, "Leave bending out, or replace it by two forces")
     held = set()
     for joint in planar.joints:
         places = [
@@ -79,21 +75,15 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
         ends = [point for own, _, point in (p.partition(".") for p in places) if own == body.name]
         held.update(ends)
         if ends and joint.kind in ("slide", "fixed"):
-            raise invalid(
-                f"{joint.name} guides the bar, but the modes are those of pinned ends",
-                "Leave bending out",
-            )
+            reason = f"{joint.name} guides the bar, but the modes are those of pinned ends"
+            raise invalid(reason, "Leave bending out")
         if ends and getattr(joint, "out_of_round", None) is not None:
-            raise invalid(
-                f"surfaces of {joint.name} are out of round, which needs rigid bodies",
-                "Leave out bending, or out_of_round",
-            )
+            reason = f"surfaces of {joint.name} are out of round, which needs rigid bodies"
+            raise invalid(reason, "Leave out bending, or out_of_round")
     for end in ("a", "b"):
         if end not in held:
-            raise invalid(
-                f"its end {end} is free, but the modes are those of pinned ends",
-                "Leave bending out, or join both ends",
-            )
+            reason = f"its end {end} is free, but the modes are those of pinned ends"
+            raise invalid(reason, "Leave bending out, or join both ends")
 
 
 Numbers = TypeVar("Numbers", float, Array, float | Array)
@@ -163,23 +153,16 @@ class PlanarBody(Table):
                     raise invalid(reason, remedy, key)
             return
         if self.inertia_ratio is not None and self.inertia:
-            raise invalid(
-                "is given beside the inertia itself", "Remove one of the two", "inertia_ratio"
-            )
+            reason = "is given beside the inertia itself"
+            raise invalid(reason, "Remove one of the two", "inertia_ratio")
         if (self.center.x, self.center.y) != (0.0, 0.0):
-            raise invalid(
-                "a bar's mass centre is given by mass_center",
-                "Write mass_center, or leave length out and give points",
-                key="center",
-                value=[self.center.x, self.center.y],
-            )
+            reason = "a bar's mass centre is given by mass_center"
+            remedy = "Write mass_center, or leave length out and give points"
+            raise invalid(reason, remedy, "center", [self.center.x, self.center.y])
         for point in self.points:
             if point.name in ("a", "b"):
-                raise invalid(
-                    "is a point that every bar has",
-                    "Give it another name",
-                    key=f"points.{point.name}",
-                )
+                reason = "is a point that every bar has"
+                raise invalid(reason, "Give it another name", f"points.{point.name}")
 
 
 class Ground(Table):
@@ -313,12 +296,9 @@ def _with_model(table: str, name: str, rows: Mapping[str, object]) -> object:
     if not isinstance(model, Mapping) or "like" in model:
         tables = {other: one for other, one in rows.items() if isinstance(one, Mapping)}
         others = [other for other, one in tables.items() if other != name and "like" not in one]
-        raise invalid(
-            "there is no such row, or it refers to another one itself",
-            nearest(str(row["like"]), others),
-            key=f"{table}.{name}.like",
-            value=row["like"],
-        )
+        reason = "there is no such row, or it refers to another one itself"
+        remedy = nearest(str(row["like"]), others)
+        raise invalid(reason, remedy, f"{table}.{name}.like", row["like"])
     made = dict(model)
     for key, value in row.items():
         own = isinstance(value, Mapping) and isinstance(model.get(key), Mapping) and key != "points"

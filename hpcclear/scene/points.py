@@ -48,9 +48,8 @@ class Points:
             or values.shape[1] != len(self.names)
             or len(self.paths) != len(self.names)
         ):
-            raise InputError(
-                "points", values.shape, "one column per name is needed", "Give an (n, d) array"
-            )
+            reason = "one column per name is needed"
+            raise InputError("points", values.shape, reason, "Give an (n, d) array")
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
 
@@ -269,10 +268,9 @@ def _read(sheet: "Sheet", column: "SheetColumn", paths: Sequence[str]) -> Array:
     values = sheet.si(column, every[0].unit, sheet.path)
     for quantity in every:
         for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
-            raise InputError(
-                sheet.place(column, row), column.cells[row], f"must be {quantity.bounds()}",
-                "Correct the value or the unit of its column",
-            )  # fmt: skip
+            reason = f"must be {quantity.bounds()}"
+            remedy = "Correct the value or the unit of its column"
+            raise InputError(sheet.place(column, row), column.cells[row], reason, remedy)
     return values
 
 
@@ -289,7 +287,6 @@ def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tu
             remedy = 'Write a name, and its unit as in "C [mm]"'
             raise InputError(key, column.heading, "is not a column name", remedy)
         remedy = nearest(column.name, (*named, *numbers))
-        raise InputError(
-            key, column.name, "is neither a variable nor a number of this scene", remedy
-        )
+        reason = "is neither a variable nor a number of this scene"
+        raise InputError(key, column.name, reason, remedy)
     return paths

@@ -138,17 +138,13 @@ def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> qu
     one = getattr(stats, own, None)
     if not isinstance(one, stats.rv_continuous):
         known = [n for n, d in vars(stats).items() if isinstance(d, stats.rv_continuous)]
-        raise invalid(
-            f"scipy.stats has no continuous distribution {own!r}",
-            nearest(own, known),
-            "distribution",
-        )
+        reason = f"scipy.stats has no continuous distribution {own!r}"
+        raise invalid(reason, nearest(own, known), "distribution")
     shapes = tuple((one.shapes or "").replace(" ", "").split(",")) if one.shapes else ()
     for key in parameters:
         if key not in (*shapes, "loc", "scale"):
-            raise invalid(
-                f"is not a parameter of scipy's {own}", nearest(key, (*shapes, "loc", "scale")), key
-            )
+            reason = f"is not a parameter of scipy's {own}"
+            raise invalid(reason, nearest(key, (*shapes, "loc", "scale")), key)
     for key in shapes:
         if key not in parameters:
             raise invalid(f"the distribution 'scipy:{own}' needs it", "Add it", key)
@@ -180,15 +176,12 @@ def _check(law: quantiles.Cut, name: str, parameters: Mapping[str, float]) -> No
             found = np.asarray(law.whole.ppf(_TESTED), float)
     except Exception as error:
         reason = f"ppf of {name} raised {type(error).__name__}: {error}"
-        raise invalid(
-            reason, "Mend it: it takes arrays of probabilities", "distribution"
-        ) from error
+        remedy = "Mend it: it takes arrays of probabilities"
+        raise invalid(reason, remedy, "distribution") from error
     fine = found.shape == _TESTED.shape and np.isfinite(found).all() and (np.diff(found) >= 0).all()
     if not fine or not found[0] < found[-1]:
-        raise invalid(
-            f"{name} with {given} has no finite, increasing quantiles",
-            "Correct its parameters", "distribution",
-        )  # fmt: skip
+        reason = f"{name} with {given} has no finite, increasing quantiles"
+        raise invalid(reason, "Correct its parameters", "distribution")
 
 
 _COMMON = ("name", "paths", "distribution")
@@ -291,20 +284,17 @@ class RandomInput(NamedInput):
             if key in needed and value is None:
                 raise invalid(f"the distribution {self.distribution!r} needs it", "Add it", key)
             if key not in needed | further | {"relative"} and value not in (None, False):
-                raise invalid(
-                    f"does not belong to this {self.distribution!r} distribution", "Remove it", key
-                )
+                reason = f"does not belong to this {self.distribution!r} distribution"
+                raise invalid(reason, "Remove it", key)
         self._check_cut()
 
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
-            raise invalid(
-                "a lognormal has a mean above 0", "Correct it, or use another distribution", "mean"
-            )
+            reason = "a lognormal has a mean above 0"
+            raise invalid(reason, "Correct it, or use another distribution", "mean")
         if self.distribution == "fit" and any(not p.endswith(".clearance") for p in self.paths):
-            raise invalid(
-                "a fit gives clearances of joints only", "Correct its path", "distribution"
-            )
+            reason = "a fit gives clearances of joints only"
+            raise invalid(reason, "Correct its path", "distribution")
         if self.worn:
             return
         law = self.law  # of a plug-in found now, while it is known where its file is
@@ -313,9 +303,8 @@ class RandomInput(NamedInput):
             cut = isinstance(law, quantiles.Normal) and law.reach < _LEAST_SHARE * law.deviation
             if cut or not low < high:
                 reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
-                raise invalid(
-                    reason, "Widen it", "range" if self.range is not None else "half_width"
-                )
+                remedy = "Widen it"
+                raise invalid(reason, remedy, "range" if self.range is not None else "half_width")
         if (
             isinstance(law, quantiles.Cut)
             and self.range is not None
@@ -323,11 +312,8 @@ class RandomInput(NamedInput):
         ):
             below, above = law.chances
             if above - below < _LEAST_SHARE:
-                raise invalid(
-                    f"contains less than {_LEAST_SHARE:g} of the distribution",
-                    "Choose bounds around its values",
-                    "range",
-                )
+                reason = f"contains less than {_LEAST_SHARE:g} of the distribution"
+                raise invalid(reason, "Choose bounds around its values", "range")
 
     @property
     def absolute(self) -> bool:

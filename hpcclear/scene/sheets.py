@@ -221,10 +221,8 @@ class Sheet:
                 break
         listed = ", ".join(one.heading for one in (by_unit or by_name or free))
         listed = listed or "none with numbers"
-        raise InputError(
-            f"{key}.{kind}", None, f"which column of {self.path} it is does not follow from its headings: {listed}",
-            f'Name it, as in {kind} = "heading"',
-        )  # fmt: skip
+        reason = f"which column of {self.path} it is does not follow from its headings: {listed}"
+        raise InputError(f"{key}.{kind}", None, reason, f'Name it, as in {kind} = "heading"')
 
     def column(self, name: str, key: str) -> SheetColumn:
         """The column of that name or heading; InputError says which there are."""
@@ -283,9 +281,8 @@ def read_series(path: Path) -> Sheet:
     sheet = read(path, "measured table")
     if len(sheet.axes) + len(sheet.signals) < 2 or len(sheet.lines) < 3:
         reason = "has no series: an axis, a quantity and three rows are needed"
-        raise InputError(
-            "measured table", str(path), reason, "Give time or angle first, then quantities"
-        )
+        remedy = "Give time or angle first, then quantities"
+        raise InputError("measured table", str(path), reason, remedy)
     return sheet
 
 

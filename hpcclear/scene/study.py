@@ -61,11 +61,8 @@ class Study(StudyTables):
 
     def _check(self) -> None:
         if not self.variables:
-            raise invalid(
-                "the list of variables is empty",
-                "Name at least one, such as m2 = { range = [0.1, 0.4] }",
-                key="variables",
-            )
+            remedy = "Name at least one, such as m2 = { range = [0.1, 0.4] }"
+            raise invalid("the list of variables is empty", remedy, "variables")
         self._check_paths()
         self.check_laws()
         for row in self.random:
@@ -87,11 +84,9 @@ class Study(StudyTables):
             if other is not None or (
                 row.name in self.names and self.variable(row.name).paths != row.paths
             ):
-                raise invalid(
-                    f"drives what the study variable {other or row.name} drives",
-                    f"Name the random input {other or row.name}, without a path",
-                    key=f"random.{row.name}",
-                )
+                reason = f"drives what the study variable {other or row.name} drives"
+                remedy = f"Name the random input {other or row.name}, without a path"
+                raise invalid(reason, remedy, f"random.{row.name}")
             for path in row.paths:
                 claim(owner, path, row.name, f"random.{row.name}")
 
@@ -106,11 +101,9 @@ class Study(StudyTables):
             return
         if self.variable(row.name).ratio is not None:
             if row.absolute:
-                raise invalid(
-                    "a distribution that does not follow the design needs a domain in SI",
-                    f"Give study.variables.{row.name} a range instead of a ratio",
-                    key=f"random.{row.name}",
-                )
+                reason = "a distribution that does not follow the design needs a domain in SI"
+                remedy = f"Give study.variables.{row.name} a range instead of a ratio"
+                raise invalid(reason, remedy, f"random.{row.name}")
             return
         if row.worn:
             return  # seen when its lives are known
@@ -135,11 +128,8 @@ class Study(StudyTables):
         for name in self.correlation.inputs if self.correlation is not None else ():
             check_known(name, known, _NO_INPUT, "correlation.inputs")
             if self.random_input(name).worn:
-                raise invalid(
-                    f"{name!r} comes from the wear simulation, which has no other input",
-                    "Leave it out",
-                    key="correlation.inputs",
-                )
+                reason = f"{name!r} comes from the wear simulation, which has no other input"
+                raise invalid(reason, "Leave it out", "correlation.inputs")
 
     def _check_cases(self) -> None:
         for case in self.cases:
@@ -147,11 +137,9 @@ class Study(StudyTables):
                 inputs = [row.name for row in self.random]
                 check_known(name, inputs, _NO_INPUT, f"cases.{case.name}")
                 if name not in self.optimisation:
-                    raise invalid(
-                        f"the surrogate of the optimisation does not contain {name!r}",
-                        "Add it to study.variables and to study.surrogate.optimisation",
-                        key=f"cases.{case.name}",
-                    )
+                    reason = f"the surrogate of the optimisation does not contain {name!r}"
+                    remedy = "Add it to study.variables and to study.surrogate.optimisation"
+                    raise invalid(reason, remedy, f"cases.{case.name}")
             if not self.design_variables(case.name):
                 raise invalid(
                     "every variable of this case has an absolute distribution,  "
@@ -176,10 +164,8 @@ class Study(StudyTables):
                     with at(f"{key}.formula", goal.formula):
                         check_known(name, own, "is no design variable of this case")
                         if self.variable(name).rows:
-                            raise invalid(
-                                f"{name!r} is a row of a table and no number",
-                                'Give its rows a cost, and write statistic = "cost"',
-                            )
+                            remedy = 'Give its rows a cost, and write statistic = "cost"'
+                            raise invalid(f"{name!r} is a row of a table and no number", remedy)
                 if goal.of is not None and goal.of != self.objective:
                     if why := self._not_recorded(goal.of):
                         remedy = f"Make it study.objective, and name {self.objective!r} in `of` in its place"
@@ -208,16 +194,13 @@ class Study(StudyTables):
     def _check_names(self) -> None:
         of_loads = [one.name for one in self.variables if one.over is not None]
         if len(of_loads) > 1:
-            raise invalid(
-                f"{of_loads[0]} and {of_loads[1]} both are load cases",
-                "Use one catalogue, with a row for each combination",
-                key=f"variables.{of_loads[1]}.over",
-            )
+            reason = f"{of_loads[0]} and {of_loads[1]} both are load cases"
+            remedy = "Use one catalogue, with a row for each combination"
+            raise invalid(reason, remedy, f"variables.{of_loads[1]}.over")
         for row in self.random:
             if row.name in of_loads:
-                raise invalid(
-                    "is a load case", "Remove it, or name another entry", f"random.{row.name}"
-                )
+                reason = "is a load case"
+                raise invalid(reason, "Remove it, or name another entry", f"random.{row.name}")
         self._check_lists(of_loads)
         self._check_groups()
 
@@ -239,9 +222,8 @@ class Study(StudyTables):
                 raise invalid("a variable is named twice", "Remove one", key=key)
             loads = [n for n in names if n in of_loads]
             if loads:
-                raise invalid(
-                    f"{loads[0]!r} is a load case, which no design chooses", "Leave it out", key=key
-                )
+                reason = f"{loads[0]!r} is a load case, which no design chooses"
+                raise invalid(reason, "Leave it out", key)
             odd = [n for n in names if not self.variable(n).paths and "optimisation" not in key]
             if odd:
                 raise invalid(
@@ -262,11 +244,8 @@ class Study(StudyTables):
                 )
             check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):
-                raise invalid(
-                    "the parameter is fixed, so it cannot be an input of a surface",
-                    "Remove it from the group",
-                    key="sensitivity.groups",
-                )
+                reason = "the parameter is fixed, so it cannot be an input of a surface"
+                raise invalid(reason, "Remove it from the group", "sensitivity.groups")
 
     def _check_sizes(self) -> None:
         stage = self.sensitivity
@@ -279,11 +258,8 @@ class Study(StudyTables):
         if self.cases:
             inputs = max(len(model) for model in self.models)
             if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
-                raise invalid(
-                    f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
-                    f"Request at least {10 * inputs} samples",
-                    "samples",
-                )
+                reason = f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit"
+                raise invalid(reason, f"Request at least {10 * inputs} samples", "samples")
 
 
 def _with_paths(row: object, variable: object) -> object:

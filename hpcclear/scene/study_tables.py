@@ -284,33 +284,22 @@ class StudyTables(Table):
         key, known = f"variables.{variable.name}", {row.name: row for row in self.random}
         check_known(name, known, "is not a random input of this study", key)
         if "." not in entry and getattr(known[name], entry) is None:
-            raise invalid(
-                f"the random input {name} has no {entry}",
-                f"Give study.random.{name}.{entry} the value of the design in this file",
-                key,
-            )
+            remedy = f"Give study.random.{name}.{entry} the value of the design in this file"
+            raise invalid(f"the random input {name} has no {entry}", remedy, key)
 
     def _check_moving(self, row: RandomInput) -> None:
         own = next((one for one in self.variables if one.name == row.name), None)
         if row.relative and (own is None or own.ratio is not None):
-            raise invalid(
-                "is a share of a number that no variable of this study has",
-                f"Add study.variables.{row.name} with a range or values, or write it in SI",
-                key=f"random.{row.name}.half_width",
-            )
+            reason = "is a share of a number that no variable of this study has"
+            remedy = f"Add study.variables.{row.name} with a range or values, or write it in SI"
+            raise invalid(reason, remedy, f"random.{row.name}.half_width")
         if own is not None and not own.paths:
-            raise invalid(
-                "its variable has no numbers to scatter about",
-                "Name another entry",
-                key=f"random.{row.name}",
-            )
+            reason = "its variable has no numbers to scatter about"
+            raise invalid(reason, "Name another entry", f"random.{row.name}")
         for design in self._extremes(row):
             try:
                 self.law(row, design)
             except (ValueError, OverflowError) as error:
                 shown = ", ".join(f"{name} = {value:g}" for name, value in design.items())
-                raise invalid(
-                    f"makes no distribution with {shown}: {getattr(error, 'reason', error)}",
-                    "Narrow what drives it",
-                    key=f"random.{row.name}",
-                ) from None
+                reason = f"makes no distribution with {shown}: {getattr(error, 'reason', error)}"
+                raise invalid(reason, "Narrow what drives it", f"random.{row.name}") from None

@@ -111,10 +111,8 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
     if waves is None:
         return
     if film is not None:
-        raise invalid(
-            "an oil film needs round surfaces", "Remove out_of_round, or film",
-            key="out_of_round", value=None,
-        )  # fmt: skip
+        reason = "an oil film needs round surfaces"
+        raise invalid(reason, "Remove out_of_round, or film", "out_of_round", None)
     for name in ("bearing", "journal"):
         own = getattr(waves, name)
         if own is not None and own.deepest() >= clearance:
@@ -174,9 +172,8 @@ class Wear(Table):
 
     def _check(self) -> None:
         if self.bearing is None and self.journal is None:
-            raise invalid(
-                "neither bearing nor journal wears", "Give one of them a coefficient", "bearing"
-            )
+            reason = "neither bearing nor journal wears"
+            raise invalid(reason, "Give one of them a coefficient", "bearing")
 
 
 class WearLimits(Table):
@@ -230,8 +227,5 @@ class Lives(Table):
 
     def _check(self) -> None:
         if self.most_copies < self.copies:
-            raise invalid(
-                "copies is larger than most_copies",
-                "Raise most_copies, or lower copies",
-                "most_copies",
-            )
+            reason = "copies is larger than most_copies"
+            raise invalid(reason, "Raise most_copies, or lower copies", "most_copies")

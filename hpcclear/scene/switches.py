@@ -257,9 +257,8 @@ class Off:
         }
         cases = {name: case for name, case in cases.items() if case["random"]}
         if not left["variables"] or (study.cases and not cases):
-            raise InputError(
-                "study", None, "no variable would be left", "Keep the effect that it varies"
-            )
+            reason = "no variable would be left"
+            raise InputError("study", None, reason, "Keep the effect that it varies")
         kept = {key: value for key, value in content.items() if key != "correlation"}
         return {
             **kept,

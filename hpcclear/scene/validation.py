@@ -126,11 +126,9 @@ def _check_study(scene: SceneTables, study: Study) -> None:
             of_rows = row.entry_paths if isinstance(row, StudyVariable) else ()
             for path in (*row.paths, *of_rows):
                 if path not in numbers:
-                    raise invalid(
-                        f"drives {path}, and this scene has no number there",
-                        "Give that entry a value first, or remove the variable",
-                        key=f"study.{table}.{row.name}",
-                    )
+                    reason = f"drives {path}, and this scene has no number there"
+                    remedy = "Give that entry a value first, or remove the variable"
+                    raise invalid(reason, remedy, f"study.{table}.{row.name}")
     _check_corners(scene, study)
     for variable in study.variables:
         if variable.rows:
@@ -144,23 +142,16 @@ def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
     for row in study.worn:
         key = f"study.random.{row.name}"
         if scene.wear is None:
-            raise invalid(
-                "the scene has no [wear] table",
-                "Add [wear], as in jobs/worn_study.toml", key, "wear",
-            )  # fmt: skip
+            reason = "the scene has no [wear] table"
+            raise invalid(reason, "Add [wear], as in jobs/worn_study.toml", key, "wear")
         for path in row.paths:
             if path not in clearances:
-                raise invalid(
-                    f"{path} is no clearance of a joint that wears",
-                    nearest(path, clearances) if clearances else "Give joints a table wear",
-                    key, "wear",
-                )  # fmt: skip
+                remedy = nearest(path, clearances) if clearances else "Give joints a table wear"
+                raise invalid(f"{path} is no clearance of a joint that wears", remedy, key, "wear")
         assert row.cycles is not None  # by validation
         if row.cycles > scene.wear.cycles:
-            raise invalid(
-                f"lives are followed for {scene.wear.cycles:g} revolutions only",
-                "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles,
-            )  # fmt: skip
+            reason = f"lives are followed for {scene.wear.cycles:g} revolutions only"
+            raise invalid(reason, "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles)
 
 
 def _check_corners(scene: SceneTables, study: Study) -> None:
@@ -210,9 +201,8 @@ def _check_corner(
     except ValidationError as error:
         said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
         reason = getattr(said, "reason", "it is not valid")
-        raise invalid(
-            f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key=key
-        ) from None
+        remedy = "Narrow it"
+        raise invalid(f"reaches {words}, which makes no mechanism: {reason}", remedy, key) from None
 
 
 def _check_depth(content: Mapping[str, object]) -> None:

@@ -80,19 +80,15 @@ class StudyVariable(NamedInput):
             return data
         if len(of_rows) < len(given):
             odd = next(p for p in given if p not in of_rows)
-            raise invalid(
-                f"{odd} is not of the same kind as {of_rows[0]}",
-                "Give it a variable of its own",
-                "paths",
-            )
+            reason = f"{odd} is not of the same kind as {of_rows[0]}"
+            raise invalid(reason, "Give it a variable of its own", "paths")
         for path in of_rows:
             if path.startswith(OF_RANDOM):
                 _, entry = choices.input_entry(path)
                 if (entry == "fit") != ("fits" in data):
-                    raise invalid(
-                        f"{path} is {'a fit' if entry == 'fit' else 'no fit'}",
-                        "Give fits = [...] for fits, else a range or values", "path",
-                    )  # fmt: skip
+                    reason = f"{path} is {'a fit' if entry == 'fit' else 'no fit'}"
+                    remedy = "Give fits = [...] for fits, else a range or values"
+                    raise invalid(reason, remedy, "path")
             elif f"{path.removesuffix('.fit')}.clearance" not in quantities():
                 raise invalid(f"{path} is no fit of a joint", 'Write "joints.NAME.fit"', "path")
         kept = {key: value for key, value in data.items() if key != "path"}
@@ -118,11 +114,8 @@ class StudyVariable(NamedInput):
             return cls._of_rows(row, kind, paths)
         if kind == "ratio":
             if len(paths) != 1 or paths[0] not in LINK_INERTIAS:
-                raise invalid(
-                    "only the inertia of crank or rod can be given as a ratio to m L^2/12",
-                    "Write range = [lower, upper] instead",
-                    key="ratio",
-                )
+                reason = "only the inertia of crank or rod can be given as a ratio to m L^2/12"
+                raise invalid(reason, "Write range = [lower, upper] instead", "ratio")
             return row | {"ratio": Quantity("", above=0).range(row["ratio"], "ratio")}
         known = [quantities()[path] for path in paths] or [_of_input(row)]
         if kind == "range":
@@ -194,20 +187,15 @@ class StudyVariable(NamedInput):
 
     def _check_load_cases(self) -> None:
         if self.options is None or self.step is not None:
-            raise invalid(
-                "load cases are values or rows of a catalogue",
-                "Write values = [...] or catalogue = [...] in place of the range", "over",
-            )  # fmt: skip
+            remedy = "Write values = [...] or catalogue = [...] in place of the range"
+            raise invalid("load cases are values or rows of a catalogue", remedy, "over")
         if self.silent or self.cost is not None:
-            raise invalid(
-                "load cases change the mechanism, and no design chooses them", "Remove it", "over"
-            )
+            reason = "load cases change the mechanism, and no design chooses them"
+            raise invalid(reason, "Remove it", "over")
         weights = () if self.over == "worst" else self.over
         if weights and (len(weights) != len(self.options) or not sum(weights) > 0.0):
-            raise invalid(
-                f"{len(self.options)} load cases need as many weights, some of them above 0",
-                'Give each a weight, or write over = "worst"', "over",
-            )  # fmt: skip
+            reason = f"{len(self.options)} load cases need as many weights, some of them above 0"
+            raise invalid(reason, 'Give each a weight, or write over = "worst"', "over")
 
     def _check_rows(self, rows: tuple[CatalogueRow, ...]) -> None:
         choices.checked_names([row.name for row in rows], "catalogue")
@@ -331,6 +319,5 @@ def _of_input(row: Content) -> Quantity:
 
 def _same_length(cost: Sequence[object], options: Sequence[object]) -> None:
     if len(cost) != len(options):
-        raise invalid(
-            f"{len(cost)} costs for {len(options)} options", "Give each option a cost", "cost"
-        )
+        reason = f"{len(cost)} costs for {len(options)} options"
+        raise invalid(reason, "Give each option a cost", "cost")

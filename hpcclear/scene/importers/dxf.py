@@ -97,11 +97,8 @@ def drawing_of(file: File) -> Drawing:
     bodies, left = _bodies(list(_joined(entities)), file)
     every = [place for body in bodies.values() for place in body.points]
     if not every:
-        file.refuse(
-            file.path.name,
-            "has no points, lines, circles or polylines",
-            "Draw the sketch in the model space",
-        )
+        reason = "has no points, lines, circles or polylines"
+        file.refuse(file.path.name, reason, "Draw the sketch in the model space")
     low = tuple(min(place[k] for place in every) for k in (0, 1))
     extent = max(math.dist(place, low) for place in every)
     places, at = _distinct(every, extent, file)
@@ -154,12 +151,9 @@ def _pairs(lines: Sequence[str], file: File) -> Iterator[tuple[int, str]]:
         try:
             yield int(lines[at]), lines[at + 1].strip()
         except ValueError:
-            raise InputError(
-                f"{file.key}, line {at + 1}",
-                lines[at][:40],
-                "is no group code",
-                "Save the drawing again as ASCII DXF",
-            ) from None
+            reason = "is no group code"
+            remedy = "Save the drawing again as ASCII DXF"
+            raise InputError(f"{file.key}, line {at + 1}", lines[at][:40], reason, remedy) from None
 
 
 def _joined(entities: Sequence[_Entity]) -> Iterator[_Entity]:
@@ -186,20 +180,16 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
     for one in entities:
         layer = one.text(8, "0")
         if one.kind == "INSERT":
-            file.refuse(
-                one.text(2)[:40], "the drawing has a block", "Explode blocks, and save it again"
-            )
+            reason = "the drawing has a block"
+            file.refuse(one.text(2)[:40], reason, "Explode blocks, and save it again")
         if one.text(67).strip() == "1" or layer.lower() == "defpoints" or one.kind not in _READ:
             where = " of the layer Defpoints" if layer.lower() == "defpoints" else ""
             where = " of the paper space" if one.text(67).strip() == "1" else where
             left[f"{one.kind[:40]}{where}"] += 1
             continue
         if one.text(230).startswith("-"):
-            file.refuse(
-                one.kind,
-                "is seen from behind (extrusion along -z)",
-                "Draw it in the plane of the sketch",
-            )
+            reason = "is seen from behind (extrusion along -z)"
+            file.refuse(one.kind, reason, "Draw it in the plane of the sketch")
         if layer.lower() in _STILL or (not by_layer and one.kind == "POINT"):
             name = GROUND
         elif by_layer:
@@ -218,11 +208,8 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
         )
         _add(bodies.setdefault(name, _Body()), one, file)
     if not bodies[GROUND].points:
-        file.refuse(
-            "ground",
-            "nothing says what stands still",
-            "Put it on a layer called ground, or draw a POINT at each pin of it",
-        )
+        remedy = "Put it on a layer called ground, or draw a POINT at each pin of it"
+        file.refuse("ground", "nothing says what stands still", remedy)
     drawn = [one for one in entities if one.kind in _READ]
     heights = {file.number(one.text(code, "0"), "a height") for one in drawn for code in (30, 31)}
     notes = []
@@ -242,9 +229,8 @@ def _add(body: _Body, one: _Entity, file: File) -> None:
     if one.kind == "LINE":
         places += one.places(11, file)
     if not places or (one.kind == "LINE" and len(places) != 2):
-        file.refuse(
-            one.kind, "has no place, or an end too many or too few", "Save the drawing again"
-        )
+        reason = "has no place, or an end too many or too few"
+        file.refuse(one.kind, reason, "Save the drawing again")
     if "POLYLINE" in one.kind and int(file.number(one.text(70) or "0", "a flag of a polyline")) & 1:
         places = [*places, places[0]]
     body.points += places
@@ -290,11 +276,8 @@ def _point(made: DrawnPoint, bodies: Mapping[str, _Body], near: float, file: Fil
             made = made._replace(slide=math.atan2(line[1][1] - line[0][1], line[1][0] - line[0][0]))
         elif line is not None:
             reason = f"lies on a line of {carrier}, and may be a pin or in a slot"
-            file.refuse(
-                f"{place[0]:g}, {place[1]:g}",
-                reason,
-                f"Draw a POINT on {carrier} for a pin; write a slot into the scene",
-            )
+            remedy = f"Draw a POINT on {carrier} for a pin; write a slot into the scene"
+            file.refuse(f"{place[0]:g}, {place[1]:g}", reason, remedy)
     return made
 
 

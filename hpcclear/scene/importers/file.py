@@ -106,10 +106,6 @@ class File(NamedTuple):
             reason, remedy = "the file states no unit of lengths", "Add --unit, such as --unit mm"
             raise InputError(f"{self.key}{where}", "length", reason, remedy)
         if stated is not None and not math.isclose(stated, given, rel_tol=1e-9):
-            raise InputError(
-                "--unit",
-                self.unit,
-                f"the file states {words}",
-                "Leave --unit out, or correct the file",
-            )
+            reason = f"the file states {words}"
+            raise InputError("--unit", self.unit, reason, "Leave --unit out, or correct the file")
         return given if stated is None else stated

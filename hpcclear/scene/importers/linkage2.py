@@ -113,17 +113,15 @@ def _left(root: ElementTree.Element, lone: Counter[str]) -> list[str]:
 def _root(file: File) -> ElementTree.Element:
     data = file.data
     if b"<!" in data:  # no entities: they may expand without bound
-        file.refuse(
-            file.path.name, "has a declaration or comment, which the program does not write"
-        )
+        reason = "has a declaration or comment, which the program does not write"
+        file.refuse(file.path.name, reason)
     try:
         root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # or of an unknown encoding
         file.refuse(file.path.name, f"is no XML that can be read ({error})")
     if root.tag != "linkage2":
-        file.refuse(
-            root.tag, "is the format of an old version of the program", "Save it with version 3"
-        )
+        reason = "is the format of an old version of the program"
+        file.refuse(root.tag, reason, "Save it with version 3")
     if root.find("ratios") is not None and len(root.find("ratios")):  # type: ignore[arg-type]
         reason, remedy = _REFUSED["gear"]
         file.refuse("ratios", f"the document has {reason}", remedy)
@@ -154,9 +152,8 @@ def _connectors(root: ElementTree.Element, file: File, names: Names) -> dict[str
         _refuse(row, file)
         x, y = (file.number(row.get(axis, ""), f"{axis} of {name}") for axis in ("x", "y"))
         if file.number(row.get("slideradius") or "0", f"the slide radius of {name}") > 0.0:
-            file.refuse(
-                name, "a connector slides along an arc", "Replace the arc by a bar to its centre"
-            )
+            reason = "a connector slides along an arc"
+            file.refuse(name, reason, "Replace the arc by a bar to its centre")
         found[id_] = _Connector(row, name, x, y)
     return found
 
@@ -222,9 +219,6 @@ def _driven(one: _Connector, file: File) -> str:
     """The body that an input turns."""
     body = next((name for name in one.links if name != GROUND), None)
     if body is None or not one.has("anchor"):
-        file.refuse(
-            one.name,
-            "an input turns no link about an anchor",
-            "Make the input an anchor of its crank",
-        )
+        reason = "an input turns no link about an anchor"
+        file.refuse(one.name, reason, "Make the input an anchor of its crank")
     return body

@@ -72,19 +72,15 @@ def drawing_of(file: File) -> Drawing:
         return _table(text, file)
     query = text.partition("?")[2] if "://" in text else text
     if query.startswith("data="):
-        file.refuse(
-            file.path.name,
-            "is a compressed link",
-            "Export the mechanism there as CSV, and import that file",
-        )
+        remedy = "Export the mechanism there as CSV, and import that file"
+        file.refuse(file.path.name, "is a compressed link", remedy)
     return _project(query, file)
 
 
 def _project(query: str, file: File) -> Drawing:
     if not query or "\n" in query or _DIGITS[(len(query) - 1) % 62] != query[-1]:
-        file.refuse(
-            query[:20], "is no complete project: its length is not what its last character says"
-        )
+        reason = "is no complete project: its length is not what its last character says"
+        file.refuse(query[:20], reason)
     fields = query[:-1].split(".")
     if len(fields) < 7:
         file.refuse(len(fields), "has fewer fields than a project")
@@ -279,11 +275,8 @@ def _drawing(
         if one.flags & _INPUT:
             speeds[own[one.key][0]] = one.speed or speed
             if not one.flags & _GROUNDED:
-                file.refuse(
-                    one.name[:40],
-                    "the input is not on the ground",
-                    "Drive a crank on the ground there",
-                )
+                reason = "the input is not on the ground"
+                file.refuse(one.name[:40], reason, "Drive a crank on the ground there")
             if len(own[one.key]) > 1:
                 notes.append(
                     f"Input {one.name} turns {own[one.key][0]}, the first of {listed(own[one.key])}"

@@ -56,9 +56,8 @@ def _columns(sheet: Sheet, file: File) -> dict[str, SheetColumn]:
         kind = next((kind for kind, words in _COLUMNS.items() if word in words), None)
         if kind is None:
             reason = "is no column of a table of points"
-            file.refuse(
-                column.heading, reason, f"{nearest(word, known)}. Known: {', '.join(_COLUMNS)}"
-            )
+            remedy = f"{nearest(word, known)}. Known: {', '.join(_COLUMNS)}"
+            file.refuse(column.heading, reason, remedy)
         if kind in found:
             reason = f"stands beside {found[kind].heading}, which is the same"
             file.refuse(column.heading, reason, "Keep one of them")
@@ -96,9 +95,8 @@ def _bodies(
     """Bodies of each point; of a file without them bars from each point to the next, the first and the last on the ground."""
     if column is None:
         if len(names) < 4:
-            file.refuse(
-                len(names), "a closed chain of bars has at least 4 points", "Add a column bodies"
-            )
+            reason = "a closed chain of bars has at least 4 points"
+            file.refuse(len(names), reason, "Add a column bodies")
         bars = [GROUND, *(f"bar{k}" for k in range(1, len(names))), GROUND]
         return list(itertools.pairwise(bars))
     known = dict.fromkeys(_GROUNDS, GROUND)

@@ -30,11 +30,8 @@ class TorsionSpringLoad(Load):
     def _check(self) -> None:
         stops = self.lower is not None or self.upper is not None
         if stops != (self.stop_stiffness > 0.0):
-            raise invalid(
-                "stops and their stiffness go together",
-                "Give lower or upper, and stop_stiffness above 0",
-                "stop_stiffness",
-            )
+            remedy = "Give lower or upper, and stop_stiffness above 0"
+            raise invalid("stops and their stiffness go together", remedy, "stop_stiffness")
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             raise invalid("is not below the upper stop", "Swap both", "lower")
 
