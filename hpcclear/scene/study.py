@@ -298,16 +298,12 @@ def _only_clearance(variables: Mapping[str, object]) -> str | None:
 
 def _enough(stage: Sensitivity, inputs: int, order: int, samples: int, entry: str) -> None:
     """Refuse fewer samples than a surface has terms; of one that chooses them, than its linear ones and a few."""
-    chosen = stage.chooses(inputs, order, samples)
     terms = math.comb(inputs + order, order)
-    least = LEAST_PER_INPUT * (inputs + 1) if chosen else terms
+    what, least = f"of order {order} in {inputs} inputs with {terms} terms", terms
+    remedy = f"Request at least {2 * terms} samples, or lower the order"
+    if stage.chooses(inputs, order, samples):
+        what, least = f"in {inputs} inputs that chooses its terms", LEAST_PER_INPUT * (inputs + 1)
+        remedy = f"Request at least {10 * inputs} samples"
     if samples < least:
-        raise invalid(
-            f"a surface in {inputs} inputs that chooses its terms needs {least} samples at least"
-            if chosen
-            else f"a surface of order {order} in {inputs} inputs has {terms} terms, "
-            f"more than the {samples} samples",
-            f"Request at least {10 * inputs if chosen else 2 * terms} samples"
-            + ("" if chosen else ", or lower the order"),
-            f"sensitivity.{entry}",
-        )
+        reason = f"a surface {what} needs {least} samples at least"
+        raise invalid(reason, remedy, f"sensitivity.{entry}")

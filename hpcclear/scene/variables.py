@@ -65,10 +65,7 @@ class StudyVariable(NamedInput):
         """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
         if "catalogue" in data and "path" not in data:
             return {**data, "paths": texts_in(data.get("paths"))}
-        given = data.get("paths", data.get("path", ()))
-        given = (given,) if isinstance(given, str) else given
-        if not isinstance(given, (list, tuple)) or any(not isinstance(p, str) for p in given):
-            return data
+        given = texts_in(data.get("paths", data.get("path", ())))
         if data.get("follows") and not given:  # read before
             given = texts_in(data["follows"])
             if not given:
@@ -142,46 +139,36 @@ class StudyVariable(NamedInput):
 
     @classmethod
     def _of_rows(cls, row: Content, kind: str, paths: tuple[str, ...]) -> Content:
-        if not isinstance(row[kind], (list, tuple)):
+        given, follows = row[kind], texts_in(row.get("follows"))
+        if not isinstance(given, (list, tuple)):
             raise invalid("a list is expected here", "Write it in [ ]", kind)
-        if paths:
-            raise invalid(
-                "drives entries of its own"
-                if kind == "catalogue"
-                else f"{paths[0]} is no fit of a joint",
-                "Remove it, and write paths in the rows"
-                if kind == "catalogue"
-                else 'Write path = "joints.NAME.fit"',
-                "path",
-            )
+        if kind == "catalogue" and (paths or follows):
+            raise invalid("has paths in its rows", "Remove it", "path")
         if kind == "fits":
-            if not row.get("follows") or any(not p.endswith(".fit") for p in row["follows"]):
-                raise invalid("does not say which joint", 'Add path = "joints.NAME.fit"', "path")
-            for k, one in enumerate(row["fits"]):
+            odd = [path for path in (*paths, *follows) if not path.endswith(".fit")]
+            if odd or not follows:
+                reason = f"{odd[0]} is no fit of a joint" if odd else "does not say which joint"
+                raise invalid(reason, 'Add path = "joints.NAME.fit"', "path")
+            for k, one in enumerate(given):
                 with at(f"fits.{k}", one):
                     choices.rows_of_fits([one], ())
-            choices.checked_names(row["fits"], "fits")
-        if row.get("follows") and kind == "catalogue":
-            raise invalid("has paths in its rows", "Remove it", "path")
+            choices.checked_names(given, "fits")
         if "cost" in row:
             if isinstance(row["cost"], list | tuple):
-                _same_length(row["cost"], row[kind])
-            row["cost"] = Cost.in_si(row["cost"], "", row[kind] if kind == "fits" else ())
+                _same_length(row["cost"], given)
+            row["cost"] = Cost.in_si(row["cost"], "", given if kind == "fits" else ())
         return row
 
     def _check_cost(self, cost: Cost) -> None:
-        if self.rows if cost.options is None else self.options is None:
-            raise invalid(
-                "is a law of a number, but the variable has rows"
-                if self.rows
-                else "names options, but the variable has none",
-                "Write cost = [...], one for each"
-                if self.rows
-                else 'Write cost = { law = "reciprocal", at = ..., cost = ... }',
-                "cost",
-            )
+        options = self.options
+        if cost.options is not None and options is None:
+            remedy = 'Write cost = { law = "reciprocal", at = ..., cost = ... }'
+            raise invalid("names options, but the variable has none", remedy, "cost")
         if cost.options is not None:
-            _same_length(cost.options, self.options or ())
+            _same_length(cost.options, options or ())
+        elif self.rows:
+            reason = "is a law of a number, but the variable has rows"
+            raise invalid(reason, "Write cost = [...], one for each", "cost")
         if cost.law == "reciprocal" and self.bounds[0] <= 0.0:
             raise invalid("has no value at 0 or below", "Give bounds above 0", "cost")
 
