@@ -1,73 +1,46 @@
-"""What a study simulates as a rule, and what a simulation of it costs, from a pilot: a few designs all over the box with their
-scatter. Cost and scatter differ from design to design, and the design in the scene may differ from all that are found.
+"""What a study simulates as a rule, and what a simulation of it costs: it is rehearsed on surrogates of a few simulations.
 
-`hpcclear.study.extent.samples_of` has the most that there can be. Verified designs take as many simulations as their errors in
-the pilot require; fronts are shorter and searches end earlier than they may.
+`hpcclear.study.extent.samples_of` has the most that there can be. How much search and verification take less than that depends
+on f, so both are carried out as they are, on what surrogates of a pilot's simulations say in place of simulations. What these
+surrogates do not explain is in it as waves that are too short for any model.
 """
 
 import time
-from collections.abc import Callable
-from types import SimpleNamespace
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.cases import Case, Constraint
-from hpcclear.scene.domain import box
-from hpcclear.scene.points import Points
+from hpcclear.scene.domain import to_coordinates
+from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
-from hpcclear.scene.stages import REPLICATES
-from hpcclear.scene.streams import generator
-from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import spread, student
-from hpcclear.study import (
-    budget,
-    extent,
-    goals,
-    optimisation,
-    truth,
-    verdicts,
-)
-from hpcclear.study.optimisation import Choice, chosen_in_all
-from hpcclear.study.paper.printed import printed_designs
+from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, tolerance
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
-
-DESIGNS, LENGTHS, PART = 4, (64, 32, 16, 8), 4
-"""Designs of a case, points of each of their replicates (the most that `LONGEST` allows), and what part of these shows how
-fast errors fall."""
-
-FALL = 0.5, 1.5
-"""Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f. The mean shows it
-first: the error of a standard deviation by few points falls alike whether f is rough or smooth."""
-
-SPENT = 0.04, 0.1, 0.12
-"""Part of what a search may simulate beyond its first designs: of smooth f; more where a design takes all simulations that it
-may have; and more where it has to keep constraints."""
-
-ENDS, OTHERS = 1.2, 0.2
-"""Times the simulations that the accuracy requested takes, of the best designs in each objective and of the baseline; part of
-all other designs that there may be which are simulated."""
-
-CONTESTED = 1.5
-"""Times the simulations that the accuracy of an objective takes: what designs get beyond it while they may be the best."""
-
-WEIGHED, SHOWN, NEAR = 2.3, 1.0, 6.0
-"""Designs of a case whose rare failures are decided by weighted simulations; ones that are shown to keep another constraint, by
-all simulations that a design may have; and times `verdicts.usual`: what shows a probability near its threshold."""
 
 LONGEST = 10.0
 """Seconds that a pilot may take."""
 
+LEAST = 8
+"""Simulations per input that a pilot needs."""
+
+WAVES, SHORT = 128, 0.1
+"""Waves that stand for what a surrogate does not explain, and their length scale, over the range of each input."""
+
 Evaluate = Callable[[Points], Records]
 
 
-class _Here(Simulations):
+class _Pilot(Simulations):
     """Simulations by a function, without files; what they took is measured."""
 
     def __init__(self, scene: Scene, evaluate: Evaluate) -> None:
@@ -86,11 +59,70 @@ class _Here(Simulations):
         return found
 
 
+class _Rehearsal(Simulations):
+    """Surrogates of a pilot in place of simulations, which are counted by stage."""
+
+    def __init__(self, run: StudyRun, count: int) -> None:
+        super().__init__(run.scene, alone(), cast(Checkpoint, None), "quiet")
+        names, region = run.study.models[-1], surrogates.domain(run, run.study.models[-1])
+        rng, self._names = run.rng("pilot"), names
+        unit = unit_lhs(count, len(names), rng)
+        places = region.lower + unit * (region.upper - region.lower)
+        points = run.simulations.designs(names, snapped(run.study, names, places, model=True))
+        records, responses = run.simulations.judged(points, "pilot")
+        self._made, self._like = (points.values, responses), records[:1]
+        self._like["status"] = Status.OK
+        bounds = np.column_stack([region.lower, region.upper])
+        method = surrogates.method_of(run.scene)
+        self._models = [method.fit(places, one, bounds, rng=rng, names=names) for one in responses]
+        self._sizes = [float(np.std(one.values - one.leave_one_out())) for one in self._models]
+        self._waves = rng.standard_normal((len(names), WAVES)) / SHORT
+        self._phases = rng.uniform(0.0, 2.0 * np.pi, WAVES)
+        self.counts = Counter[str]()
+
+    @property
+    def model(self) -> Piecewise:
+        """The surrogate of f."""
+        unknown = np.full(1, np.nan)
+        return Piecewise((self._models[0],), unknown, unknown, np.zeros(1, bool))
+
+    def judged(self, points: Points, stage: str) -> tuple[Records, Array]:
+        """What surrogates say, with waves as large as their errors."""
+        leaf, names = self._models[0], [points.names.index(name) for name in self._names]
+        places = to_coordinates(self.scene, self._names, points.values[:, names])
+        places = np.clip(places, leaf.lower, leaf.upper)
+        phases = (places - leaf.lower) / (leaf.upper - leaf.lower) @ self._waves + self._phases
+        waves = np.sqrt(2.0 / WAVES) * np.cos(phases).sum(axis=1)
+        found = np.array(
+            [
+                one.predict(places) + size * waves
+                for one, size in zip(self._models, self._sizes, strict=True)
+            ]
+        )
+        records = np.repeat(self._like, len(points))
+        records["objective"] = found[0]
+        self.counts[stage] += len(points)
+        self.next += len(points) * extent.loads_of(self.scene)
+        return records, found
+
+    def met(self) -> tuple[Array, Array]:
+        """Designs of the pilot and their responses."""
+        return self._made
+
+
+class _Run(StudyRun):
+    """A run without files, whose simulations are the same at any tolerance."""
+
+    def of(self, scene: Scene) -> StudyRun:
+        """The same run with other settings."""
+        return replace(self, scene=scene)
+
+
 def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, float]:
     """Simulations that a study takes as a rule, and what one of them costs on one core.
 
-    Where the pilot takes longer than `LONGEST`, makes no mechanisms, or needs worn clearances that are not known yet, these are
-    `hpcclear.study.extent.samples_of` and `seconds`.
+    Where fewer than `LEAST` simulations per input take longer than `LONGEST`, designs of the pilot make no mechanisms, or worn
+    clearances are needed that are not known yet, these are `hpcclear.study.extent.samples_of` and `seconds`.
 
     Parameters
     ----------
@@ -101,104 +133,33 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     seconds : float
         Of a simulation, as far as is known without a pilot.
     """
+    from threadpoolctl import threadpool_limits
+
     study, samples = scene.required_study, extent.samples_of(scene)
-    pilot = len(study.cases) * DESIGNS * REPLICATES * seconds
-    lengths = [length for length in LENGTHS if pilot * length <= LONGEST]
-    here = _Here(scene, evaluate)
-    run = cast(StudyRun, SimpleNamespace(scene=scene, study=study, simulations=here))
-    if study.worn or not lengths:
+    each = seconds * extent.loads_of(scene)
+    count = min(study.samples, int(LONGEST / max(each, 1e-9)))
+    if study.worn or count < LEAST * len(study.models[-1]):
         return sum(samples.values()), seconds
+    pilot = _Pilot(scene, evaluate)
+    run = _Run(scene, Path(), alone(), cast(Checkpoint, None), pilot, lambda text: None)
     try:
-        each = np.array([_of_case(run, case, lengths[0]) for case in study.cases])
+        with threadpool_limits(limits=1, user_api="blas"):
+            counts = _rehearsed(run, count, samples)
     except InputError:
         return sum(samples.values()), seconds
-    searched, verified = np.sum(
-        [_spent(study, case, its) for case, its in zip(study.cases, each, strict=True)], axis=0
-    ).tolist()
-    verified += len(printed_designs(scene)) * _looked(study)
-    found = {"search": searched, "verification": verified}
-    samples |= {name: int(extent.loads_of(scene) * count) for name, count in found.items()}
-    return sum(samples.values()), here.seconds / here.count
+    loads = extent.loads_of(scene)
+    samples |= {name: loads * counts[name] for name in ("search", "verification", "pairs")}
+    return sum(samples.values()), pilot.seconds / pilot.count
 
 
-def _spent(study: Study, case: Case, its: float) -> tuple[float, float]:
-    """Simulations of the search and of the verification of a case, of which a design takes `its` for its accuracy."""
-    settings, (begun, further) = study.verification, budget.simulations(study)
-    least = truth.first_length(settings) * REPLICATES / 2
-    rough = np.log(its / least) / np.log(settings.most_samples / least)
-    part = SPENT[0] + SPENT[1] * rough + SPENT[2] * bool(case.kept)
-    designs = sum(chosen_in_all(study)) / len(study.cases)
-    if settings.infill_rounds:
-        designs = budget.designs(study, case)
-    ends = min(1 + case.plain + sum(not goal.exact for goal in case.goals), designs)
-    verified = ENDS * ends * its + OTHERS * (designs - ends + 1) * min(_looked(study), its)
-    if settings.draws:
-        verified = designs * its + _looked(study)
-    verified += WEIGHED * verdicts.usual_in(case, settings)
-    shown = [_shown_by(one, study) for one in case.kept if not one.exact]
-    verified += SHOWN * max(shown, default=0.0)
-    return (begun + np.clip(part, 0.0, 1.0) * further) / len(study.cases), verified
-
-
-def _looked(study: Study) -> float:
-    """Simulations that each verified design begins with."""
-    looks = truth.first_length(study.verification), truth.search_length(study), truth.LOOK
-    return min(looks) * REPLICATES
-
-
-def _shown_by(goal: Constraint, study: Study) -> float:
-    """Simulations that show a design to keep a constraint near its threshold, but for rare failures."""
-    settings = study.verification
-    if verdicts.rare(goal, settings):
-        return 0.0
-    most = float(settings.draws or settings.most_samples)
-    usual = verdicts.usual(goal, settings)
-    return min(NEAR * usual, most) if usual else most
-
-
-def _of_case(run: StudyRun, case: Case, length: int) -> float:
-    """Simulations of a verified design, on average over the pilot's, which have so many points of each replicate."""
-    names, study = run.study.design_variables(case.name), run.study
-    region = box(run.scene, names)
-    unit = unit_lhs(DESIGNS, len(names), generator(study.seed, "pilot", case.name))
-    choices = optimisation.choices(
-        run, case.name, region.lower + unit * (region.upper - region.lower)
-    )
-    made = truth.looked_at(run, choices, "pilot", "pilot", length)
-    settings = study.verification
-    if settings.draws is not None:
-        return float(settings.draws)
-    early, late = (
-        np.array([_errors(run, one, its[..., :n]) for one, its in zip(choices, made, strict=True)])
-        for n in (length // PART, length)
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steep = np.log(early / late) / np.log(PART)
-        shown = np.nanmean(np.where(np.isfinite(steep), steep, np.nan), axis=0)
-        fall = np.clip((shown + shown[0]) / 2.0, *FALL)
-        needed = length * REPLICATES * late ** (1.0 / np.nan_to_num(fall, nan=FALL[0]))
-    if settings.contest > 1:
-        objectives = sum(not goal.exact for goal in case.goals)
-        needed[:, 1 : 1 + objectives] *= CONTESTED
-    most = np.sqrt(2.0) * np.nan_to_num(needed, nan=0.0).max(axis=1)  # lengths double
-    least = truth.first_length(settings) * REPLICATES
-    each = np.clip(most, least, settings.most_samples)
-    return float(each.mean())
-
-
-def _errors(run: StudyRun, choice: Choice, values: Array) -> Array:
-    """Half-widths of all that a design is verified in, over the accuracy requested, (k,), from values (responses,
-    replicates, n)."""
-    settings, case = run.study.verification, run.study.case(choice.case)
-    mean, _, _, *others = truth.estimates_of(run, choice, values)
-    wanted = run.study.wanted
-    rows = [(mean, 1.0, mean.value)]  # shows how errors fall, whether it is asked for or not
-    for goal, one in zip((*case.goals, *case.kept), others, strict=True):
-        decided = goal in case.kept and goal.statistic == "exceedance"
-        if not goal.exact and not decided:
-            share, relative = goals.wanted(goal, wanted)
-            rows.append((one, share, one.value if relative else 1.0))
-    width = student(settings.confidence, REPLICATES - 1)
-    errors = np.array([spread(one.shifts[None])[0] for one, *_ in rows])
-    sizes = np.array([share * abs(scale) for _, share, scale in rows])
-    return np.asarray(width * errors / np.where(sizes > 0.0, sizes, np.nan))
+def _rehearsed(run: StudyRun, count: int, samples: Mapping[str, int]) -> Counter[str]:
+    """Simulations by stage of search and verification, if f is as by so many simulations."""
+    simulations = _Rehearsal(run, count)
+    run = replace(run, simulations=simulations)
+    simulations.next = sum(samples[name] for name in ("sensitivity", "kriging") if name in samples)
+    found = optimisation.optimise(run, simulations.model)
+    ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
+    better = search.search(run, [*ends, *between], simulations.model)
+    designs = stages.to_verify(run, ends, between, better)
+    rare.decided(run, designs, tolerance.verified(run, designs), "verification")
+    return simulations.counts

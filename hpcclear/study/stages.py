@@ -110,13 +110,19 @@ def _search(run: StudyRun, models: Models) -> SearchOutcome:
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
     result = run.stage("search", search.search, [*ends, *between], models.searched)
+    return SearchOutcome(
+        to_verify(run, ends, between, result), [str(text) for text in result["remarks"]]
+    )
+
+
+def to_verify(
+    run: StudyRun, ends: Sequence[Choice], between: Sequence[Choice], result: Result
+) -> list[Choice]:
+    """Designs that are verified, of the ends of the swarm's fronts, those between them, and the result of a search."""
     papers = ends if is_the_papers(run.scene) else []
     better = search.found_in(run, result)
     designs = optimisation.distinct([*papers, *better]) if better else [*ends, *between]
-    remarks = [str(text) for text in result["remarks"]]
-    return SearchOutcome(
-        [*designs, *verification.original(run), *printed_designs(run.scene)], remarks
-    )
+    return [*designs, *verification.original(run), *printed_designs(run.scene)]
 
 
 def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verified:
