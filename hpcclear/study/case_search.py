@@ -132,7 +132,7 @@ class CaseSearch:
             elif worth > (least or self._least):
                 beliefs.take(point)
                 rows += self.designs.add(point[None])
-            elif worth > 0.0:
+            else:
                 left.append((worth / (least or self._least), point))
         self._idle = self._idle + 1 if len(left) == count else 0
         if self._idle and left:  # the models may be wrong: there, and where nothing is known

@@ -23,6 +23,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_coordinates
 from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, tolerance
 from hpcclear.study.run import StudyRun
@@ -34,7 +35,7 @@ LONGEST = 10.0
 LEAST = 8
 """Simulations per input that a pilot needs."""
 
-WAVES, SHORT = 128, 0.1
+WAVES, SHORT = 128, 0.02
 """Waves that stand for what a surrogate does not explain, and their length scale, over the range of each input."""
 
 Evaluate = Callable[[Points], Records]
@@ -75,7 +76,12 @@ class _Rehearsal(Simulations):
         bounds = np.column_stack([region.lower, region.upper])
         method = surrogates.method_of(run.scene)
         self._models = [method.fit(places, one, bounds, rng=rng, names=names) for one in responses]
-        self._sizes = [float(np.std(one.values - one.leave_one_out())) for one in self._models]
+        self._sizes = [
+            one.scale * one.noise_variance**0.5
+            if isinstance(one, Kriging)
+            else float(np.std(one.values - one.leave_one_out()))
+            for one in self._models
+        ]
         self._waves = rng.standard_normal((len(names), WAVES)) / SHORT
         self._phases = rng.uniform(0.0, 2.0 * np.pi, WAVES)
         self.counts = Counter[str]()
