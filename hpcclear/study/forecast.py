@@ -32,7 +32,7 @@ from hpcclear.study.simulations import Simulations
 LONGEST = 10.0
 """Seconds that a pilot may take."""
 
-LEAST = 8
+LEAST = 5
 """Simulations per input that a pilot needs."""
 
 WAVES, SHORT = 128, 0.02
@@ -75,7 +75,8 @@ class _Rehearsal(Simulations):
         self._like["status"] = Status.OK
         bounds = np.column_stack([region.lower, region.upper])
         method = surrogates.method_of(run.scene)
-        self._models = [method.fit(places, one, bounds, rng=rng, names=names) for one in responses]
+        labels = [surrogates.coordinate(run.study.variable(name)) for name in names]
+        self._models = [method.fit(places, one, bounds, rng=rng, names=labels) for one in responses]
         self._sizes = [
             one.scale * one.noise_variance**0.5
             if isinstance(one, Kriging)
