@@ -33,15 +33,9 @@ def quantiles(values: Array, levels: Array) -> Array:
 
     The least value that at least that share of the values does not exceed: an infinite one stays infinite.
     """
-    known = np.where(np.isnan(values), np.inf, values)
-    ordered = np.sort(known, axis=0)
-    total = (~np.isnan(values)).sum(axis=0)
-    found = []
-    for level in levels:
-        rank = np.maximum(np.ceil(level * total).astype(int) - 1, 0)
-        value = np.take_along_axis(ordered, rank[None], axis=0)[0]
-        found.append(np.where(total > 0, value, np.nan))
-    return np.stack(found)
+    ordered, total = np.sort(values, axis=0), (~np.isnan(values)).sum(axis=0)  # NaN stand last
+    rank = np.maximum(np.ceil(np.multiply.outer(levels, total)).astype(int) - 1, 0)
+    return np.asarray(np.take_along_axis(ordered, rank, axis=0))
 
 
 def rank_correlation(first: Array, second: Array) -> float:

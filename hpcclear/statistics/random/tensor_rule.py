@@ -1,5 +1,6 @@
 """Tensor Gauss rules on a Kriging model: which nodes, and what of them can be made ready."""
 
+from functools import reduce
 from itertools import product
 from math import sqrt
 
@@ -21,11 +22,7 @@ class TensorRule:
     """The tensor rule on one model, with all that does not depend on the design made ready."""
 
     def __init__(
-        self,
-        leaf: Kriging,
-        wiring: Wiring,
-        tolerance: float,
-        probes: np.ndarray | None,
+        self, leaf: Kriging, wiring: Wiring, tolerance: float, probes: np.ndarray | None
     ) -> None:
         self.leaf, self.wiring = leaf, wiring
         self.counts = self._choose(tolerance, probes)
@@ -48,9 +45,7 @@ class TensorRule:
         for group in self.moving:
             at, weights = self._nodes(group, designs)
             shares.append(weights)
-            span = leaf.upper[list(group.dims)] - leaf.lower[list(group.dims)]
-            unit = (at - leaf.lower[list(group.dims)]) / span
-            places.append(unit.reshape(count, unit.shape[1] * unit.shape[2]))
+            places.append(self._in_unit(group, at).reshape(count, at.shape[1] * at.shape[2]))
         found = tensor_moments(
             np.concatenate(places, axis=1),
             np.concatenate(shares, axis=1),
@@ -68,12 +63,15 @@ class TensorRule:
         """Places ``(n, N, D)`` of a group's nodes and their probabilities ``(n, N)``."""
         rules = [rule(self.wiring.random[name].law, self.counts[name]) for name in group.sources]
         nodes = tensor([places[None] for places, _ in rules])
-        weights = np.ones((1, 1))
-        for part in tensor([weights[None] for _, weights in rules]):
-            weights = weights * part
+        weights = reduce(np.multiply, tensor([one[None] for _, one in rules]), np.ones((1, 1)))
         draws = dict(zip(group.sources, nodes, strict=True))
         places = self.wiring.places(group.dims, designs, draws)
         return places, np.broadcast_to(weights, places.shape[:2])
+
+    def _in_unit(self, group: Group, places: np.ndarray) -> np.ndarray:
+        """Places (..., D) of a group's inputs in the unit cube."""
+        lower, dims = self.leaf.lower, list(group.dims)
+        return np.asarray((places - lower[dims]) / (self.leaf.upper[dims] - lower[dims]))
 
     def _still(self) -> tuple[np.ndarray, np.ndarray]:
         """Kernel rows times weights, and node probabilities of what never moves."""
@@ -85,7 +83,7 @@ class TensorRule:
                 continue
             places, chances = self._nodes(group, np.empty((1, len(self.wiring.column))))
             dims = list(group.dims)
-            unit = (places[0] - leaf.lower[dims]) / (leaf.upper[dims] - leaf.lower[dims])
+            unit = self._in_unit(group, places[0])
             steps = (unit / leaf.length_scales[dims])[:, :, None] - scaled[dims]
             kernels = np.exp(-0.5 * np.square(steps).sum(axis=1))
             rows = (rows[:, None, :] * kernels).reshape(-1, scaled.shape[1])

@@ -128,8 +128,8 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
     shape = steps, len(design.clearances)
     y = np.asarray(values, float).reshape(*shape, -1)
     x = design.points[:, :-1].reshape(*y.shape, n_variables)
-    gradient = np.full((2, *shape, n_variables), np.nan)
-    quality = np.full((3, *shape), np.nan)
+    slope, error = gradient = np.full((2, *shape, n_variables), np.nan)
+    r2, rmae, left_out = quality = np.full((3, *shape), np.nan)
     freedom = np.zeros(shape, np.int64)
     for k, c in np.ndindex(*shape):
         surface = _surface(design, k, x[k, c], y[k, c])
@@ -145,18 +145,8 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
             "too many simulations failed to fit a surface",
             "look at their status, correct the cause, or use more points",
         )
-    return SensitivityHistory(
-        intervals=design.intervals,
-        clearances=design.clearances,
-        sensitivity=gradient[0],
-        standard_error=gradient[1],
-        r2=quality[0],
-        rmae=quality[1],
-        leave_one_out_r2=quality[2],
-        degrees_of_freedom=freedom,
-        failed=failed,
-        order=design.settings.order,
-    )
+    where, order = (design.intervals, design.clearances), design.settings.order
+    return SensitivityHistory(*where, slope, error, r2, rmae, left_out, freedom, failed, order)
 
 
 def _surface(

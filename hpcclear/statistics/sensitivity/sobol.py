@@ -56,10 +56,8 @@ def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Ar
     )
     unit = np.stack([unit[:, :d], unit[:, d:]])
     a, b = box[:, 0] + unit * (box[:, 1] - box[:, 0])
-    mixed = np.repeat(a[np.newaxis], d, axis=0)
-    for j in range(d):
-        mixed[j, :, j] = b[:, j]
-    return np.vstack([a, b, *mixed])
+    own = np.eye(d, dtype=bool)[:, np.newaxis]  # of each input, which column is B's
+    return np.vstack([a, b, *np.where(own, b, a)])
 
 
 def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95) -> SobolIndices:
@@ -80,16 +78,11 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
             "a simulation failed in nearly every row",
             "look at their status, correct the cause, or narrow the bounds",
         )
-    indices = _indices(y)
+    first, total = indices = _indices(y)
     reach = _jackknife(y, replicate) * student(confidence, max(len(np.unique(replicate)) - 1, 1))
     intervals = np.stack([indices - reach, indices + reach], axis=-1)
     return SobolIndices(
-        first=indices[0],
-        total=indices[1],
-        first_interval=intervals[0],
-        total_interval=intervals[1],
-        mean=float(y[:2].mean()),
-        variance=float(y[:2].var()),
+        first, total, intervals[0], intervals[1], float(y[:2].mean()), float(y[:2].var())
     )
 
 
@@ -112,9 +105,8 @@ def noise_share(values: Array, nearby: Array, variance: float) -> tuple[float, f
     halves = halves[np.isfinite(halves)]
     if len(halves) < 4 or not variance > 0.0:
         return np.nan, np.nan
-    return float(halves.mean() / variance), float(
-        halves.std(ddof=1) / len(halves) ** 0.5 / variance
-    )
+    error = halves.std(ddof=1) / len(halves) ** 0.5
+    return float(halves.mean() / variance), float(error / variance)
 
 
 def _indices(y: Array) -> Array:

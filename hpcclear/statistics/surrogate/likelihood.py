@@ -14,6 +14,7 @@ is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, fu
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg.blas import dsymm, dsyr
@@ -73,16 +74,15 @@ def maximise(
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
     if len(parts) == 1:
-        top = _climbed(starts, centred, values, limits, kernel, shares)
+        top = _climbed(starts, limits, centred, values, kernel, shares)
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
-        top = _climbed(
-            starts, centred[parts[0]], values[parts[0]], limits, kernel, shares[parts[0]]
-        )
+        first = parts[0]
+        top = _climbed(starts, limits, centred[first], values[first], kernel, shares[first])
         top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
         for part in parts[1:]:
-            top = _climbed([top], centred[part], values[part], limits, kernel, shares[part])
+            top = _climbed([top], limits, centred[part], values[part], kernel, shares[part])
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
@@ -103,27 +103,12 @@ def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
     return [np.sort(order[:size]) for size in sizes]
 
 
-def _climbed(
-    starts: list[Array],
-    centred: Array,
-    values: Array,
-    limits: Array,
-    kernel: Kernel,
-    shares: Array,
-) -> Array:
-    """The best that is found from these starts, logarithms as in `negative_likelihood`, shape (d + 2,)."""
+def _climbed(starts: list[Array], limits: Array, *of: Any) -> Array:
+    """The best that is found from these starts, logarithms as `negative_likelihood` of so much takes them, shape (d + 2,)."""
     from scipy.optimize import minimize  # only fitting needs it
 
-    found = [
-        minimize(
-            lambda theta: negative_likelihood(theta, centred, values, kernel, shares),
-            one,
-            method="L-BFGS-B",
-            jac=True,
-            bounds=limits,
-        )
-        for one in starts
-    ]
+    given = {"args": of, "method": "L-BFGS-B", "jac": True, "bounds": limits}
+    found = [minimize(negative_likelihood, one, **given) for one in starts]
     return np.asarray(min(found, key=lambda one: float(one.fun)).x)
 
 

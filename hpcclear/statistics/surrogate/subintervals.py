@@ -82,10 +82,8 @@ def fit_subintervals(
             accepted = reached.meets(settings.r2_min, settings.rmae_max)
             if not accepted and box.resampled < settings.max_resamples:
                 box.resampled += 1
-                box.wanted = [
-                    snap(latin_hypercube(settings.samples, box.bounds, box.rng)),
-                    box.tests[:0],
-                ]
+                fresh = latin_hypercube(settings.samples, box.bounds, box.rng)
+                box.wanted = [snap(fresh), box.tests[:0]]
                 following.append(box)
             elif not accepted and box.depth < settings.max_depth:
                 for half in _halves(box, model.steepest()):
@@ -107,16 +105,9 @@ def _first_boxes(
         np.linspace(low, high, piece + 1) for (low, high), piece in zip(bounds, pieces, strict=True)
     ]
     corners = list(product(*(range(piece) for piece in pieces)))
-    nothing, none = np.empty((0, dims)), np.empty(0)
+    nothing = np.empty((0, dims)), np.empty(0)
     return [
-        _Box(
-            np.array([edges[d][k : k + 2] for d, k in enumerate(corner)]),
-            own,
-            nothing,
-            none,
-            nothing,
-            none,
-        )
+        _Box(np.array([edges[d][k : k + 2] for d, k in enumerate(corner)]), own, *nothing, *nothing)
         for corner, own in zip(corners, rng.spawn(len(corners)), strict=True)
     ]
 
@@ -128,14 +119,10 @@ def _evaluate_wanted(evaluate: Evaluate, boxes: list[_Box]) -> None:
     parts = iter(np.split(values, np.cumsum([len(batch) for batch in batches])[:-1]))
     for box in boxes:
         points, tests = box.wanted
-        box.points, box.values = (
-            np.concatenate([box.points, points]),
-            np.concatenate([box.values, next(parts)]),
-        )
-        box.tests, box.truths = (
-            np.concatenate([box.tests, tests]),
-            np.concatenate([box.truths, next(parts)]),
-        )
+        box.points = np.concatenate([box.points, points])
+        box.values = np.concatenate([box.values, next(parts)])
+        box.tests = np.concatenate([box.tests, tests])
+        box.truths = np.concatenate([box.truths, next(parts)])
         box.wanted = []
 
 
@@ -146,35 +133,20 @@ def _halves(box: _Box, dim: int) -> list[_Box]:
     training points they are welcome.)
     """
     middle = box.bounds[dim].mean()
-    points, values = (
-        np.concatenate([box.points, box.tests]),
-        np.concatenate([box.values, box.truths]),
-    )
-    halves = []
+    points = np.concatenate([box.points, box.tests])
+    values = np.concatenate([box.values, box.truths])
+    nothing, halves = (box.tests[:0], box.truths[:0]), []
     for side, rng in enumerate(box.rng.spawn(2)):
         bounds = box.bounds.copy()
         bounds[dim, 1 - side] = middle
         here = (points[:, dim] < middle) if side == 0 else (points[:, dim] >= middle)
-        halves.append(
-            _Box(
-                bounds,
-                rng,
-                points[here],
-                values[here],
-                box.tests[:0],
-                box.truths[:0],
-                box.depth + 1,
-            )
-        )
+        halves.append(_Box(bounds, rng, points[here], values[here], *nothing, box.depth + 1))
     return halves
 
 
 def _joined(done: list[tuple[Leaf, Accuracy, bool]]) -> Piecewise:
     """One object, boxes in the order of their lower corners."""
     done = sorted(done, key=lambda item: tuple(item[0].lower))
-    return Piecewise(
-        leaves=tuple(model for model, _, _ in done),
-        r2=np.array([reached.r2 for _, reached, _ in done]),
-        rmae=np.array([reached.rmae for _, reached, _ in done]),
-        accepted=np.array([accepted for _, _, accepted in done]),
-    )
+    models, reached, accepted = zip(*done, strict=True)
+    r2, rmae = (np.array([getattr(one, name) for one in reached]) for name in ("r2", "rmae"))
+    return Piecewise(models, r2, rmae, np.array(accepted))
