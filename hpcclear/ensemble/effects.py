@@ -43,11 +43,7 @@ def compile_share(payloads: Sequence[Payload], ranks: Ranks) -> None:
 
 
 def run_effects(
-    scene: Scene,
-    output: Path,
-    ranks: Ranks,
-    options: Options,
-    wanted: Wanted,
+    scene: Scene, output: Path, ranks: Ranks, options: Options, wanted: Wanted
 ) -> Finished:
     """Certify on all ranks which effects a scene can do without, and write it; on root.
 

@@ -44,9 +44,7 @@ def revolution_times(scene: Scene, inputs: Points | None) -> Array:
         for path in paths
         if ".wear." not in path
     ]
-    values = (
-        np.stack([column for _, column in driven], -1) if driven else np.empty((len(inputs), 0))
-    )
+    values = np.array([column for _, column in driven]).reshape(-1, len(inputs)).T
     names = tuple(path for path, _ in driven)
     return Parameters(parameters(scene, Points(names, values, tuple((n,) for n in names)))).period
 

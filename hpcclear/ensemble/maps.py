@@ -81,22 +81,16 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
     """
     parsed = [axis(scene, words) for words in axes]
     names = tuple(name for name, _, _ in parsed)
-    if len({entry for _, paths, _ in parsed for entry in paths}) < sum(
-        len(p) for _, p, _ in parsed
-    ):
+    driven = [entry for _, paths, _ in parsed for entry in paths]
+    if len(set(driven)) < len(driven):
         raise InputError("map", " ".join(axes), "two axes drive the same entry", "Drop one")
     grid = np.meshgrid(*(values for _, _, values in parsed), indexing="ij")
-    points = Points(
-        names, np.column_stack([g.ravel() for g in grid]), tuple(p for _, p, _ in parsed)
-    )
+    values = np.column_stack([one.ravel() for one in grid])
+    points = Points(names, values, tuple(paths for _, paths, _ in parsed))
     check_points(scene, points)
     if not scene.clearance_joints():
-        raise InputError(
-            "joints",
-            None,
-            "there is no joint with clearance",
-            'Set a joint\'s kind = "clearance"',
-        )
+        remedy = 'Set a joint\'s kind = "clearance"'
+        raise InputError("joints", None, "there is no joint with clearance", remedy)
     return points, grid[0].shape
 
 
@@ -130,20 +124,13 @@ def run_map(
             session.describe(scene, mapped=True)
             checkpoint = session.opened(points.units)
             progress = Progress("cells", options.style)
+            where, kind = (ranks, checkpoint, progress), session.record
             records = sample_points(
-                scene,
-                points,
-                ranks,
-                checkpoint,
-                progress,
-                stage="map",
-                maker=make_mapper,
-                record=session.record,
+                scene, points, *where, stage="map", maker=make_mapper, record=kind
             )
-            attributes = {**session.attributes, SHAPE: " ".join(str(n) for n in shape)}
+            attributes = {**session.attributes, SHAPE: " ".join(map(str, shape))}
             with saving(checkpoint.flush):
-                content = session.write(
-                    samples_of(points, records, attributes, joints=session.joints)
-                )
+                cells_of = samples_of(points, records, attributes, joints=session.joints)
+                content = session.write(cells_of)
         session.close()
     return session.finished(content, began)

@@ -66,18 +66,15 @@ def _compared(name: str, content: Results, kind: str, count: int) -> Repeated:
     scene = scene_of_text(str(content.attrs.get("scene", "")), name)
     changed = tuple(_changed(content, scene))
     if content.attrs.get("scene_hash") != scene.hash:
-        return Repeated(
-            name, "not simulated: its scene reads otherwise in this version", (), changed
-        )
+        why = "not simulated: its scene reads otherwise in this version"
+        return Repeated(name, why, (), changed)
     if kind == "response":
         extent, (ours, theirs) = "its series", _series(content, scene)
     else:
         chosen = np.unique(np.linspace(0, content.sizes["sample"] - 1, count).round().astype(int))
         theirs = content.isel(sample=chosen)
-        extent, ours = (
-            f"{len(chosen)} of {content.sizes['sample']} samples",
-            _samples(theirs, scene),
-        )
+        extent = f"{len(chosen)} of {content.sizes['sample']} samples"
+        ours = _samples(theirs, scene)
     return Repeated(name, extent, tuple(_differing(ours, theirs)), changed)
 
 
@@ -88,10 +85,8 @@ def _samples(content: Results, scene: Scene) -> Results:
         for name, one in content.data_vars.items()
         if one.attrs.get("role") == "design_variable"
     }
-    points = as_points(
-        scene,
-        {str(one.attrs.get("scene_path", name)): one.to_numpy() for name, one in rows.items()},
-    )
+    paths = {str(one.attrs.get("scene_path", name)): one for name, one in rows.items()}
+    points = as_points(scene, {path: one.to_numpy() for path, one in paths.items()})
     records = evaluate_records(scene, points)
     named = replace(points, names=tuple(rows))
     return samples_of(named, records, {}, scene.objective, scene.joint_labels)

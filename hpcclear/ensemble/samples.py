@@ -45,12 +45,8 @@ def design(scene: Scene, table: Path | None) -> Points:
     if table is not None:
         return read_points(table, scene)
     if scene.study is None:
-        raise InputError(
-            "study",
-            None,
-            "the scene has no [study] table",
-            "Add a [study] table, or give --points designs.csv",
-        )
+        remedy = "Add a [study] table, or give --points designs.csv"
+        raise InputError("study", None, "the scene has no [study] table", remedy)
     return sampled(scene)
 
 
@@ -105,10 +101,7 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Res
 def _write(session: Session, scene: Scene, points: Points, records: Records) -> Results:
     """Write the file of samples; returns what was written."""
     attributes = session.attributes | recorded(scene, records)
-    content = samples_of(points, records, attributes, scene.objective, session.joints)
-    with session.writing():
-        dataset.write(content, session.place.output)
-    return content
+    return session.write(samples_of(points, records, attributes, scene.objective, session.joints))
 
 
 def samples_of(
@@ -120,16 +113,10 @@ def samples_of(
 ) -> Results:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
     drawn = {"sampling": points.sampling} if points.sampling else {}
+    designs = points.names, points.values, points.units
+    about, words = {**attributes, **drawn}, points.words
     return dataset.samples_dataset(
-        points.names,
-        points.values,
-        points.units,
-        records,
-        {**attributes, **drawn},
-        objective,
-        points.words,
-        joints,
-        points.labels,
+        *designs, records, about, objective, words, joints, points.labels
     )
 
 
@@ -159,12 +146,8 @@ def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarr
     check_key(content, part.key(scene, points), path)
     records = dataset.records(content)
     if not np.array_equal(records["sample"], part.rows(len(points))):
-        raise InputError(
-            "file",
-            str(path),
-            "it does not contain the samples of its part",
-            "Remove it, and run that part again",
-        )
+        reason = "it does not contain the samples of its part"
+        raise InputError("file", str(path), reason, "Remove it, and run that part again")
     return recast(records, record_of(scene))
 
 
@@ -225,6 +208,7 @@ def sample_points(
         with ranks.stage(stage), ranks.writing():
             checkpoint.flush()
 
+    due = checkpoint.flush_when_due
     with saving(save):
         return leading.run_points(
             ranks,
@@ -232,6 +216,6 @@ def sample_points(
             sent.values,
             completed=completed,
             on_records=take,
-            save=checkpoint.flush_when_due,
+            save=due,
             progress=progress,
         )

@@ -27,12 +27,7 @@ from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style, clear
 from hpcclear.results import dataset, files, netcdf
-from hpcclear.results.checkpoint import (
-    INTERVAL,
-    Checkpoint,
-    discard,
-    unfinished,
-)
+from hpcclear.results.checkpoint import INTERVAL, Checkpoint, discard, unfinished
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key, key_attribute, key_of
 from hpcclear.results.places import fresh_sibling, parts_of
@@ -254,11 +249,7 @@ class Session:
         """Set `attributes`, what made the files of this run, the labels of its joints, and the type of its samples' records
         (arguments as of `record_of`)."""
         self.joints, self.record = scene.joint_labels, record_of(scene, mapped)
-        self.attributes = {
-            **scene.origin,
-            **program(),
-            **key_attribute(self.key),
-        }
+        self.attributes = {**scene.origin, **program(), **key_attribute(self.key)}
 
     def opened(self, units: Mapping[str, str] | None = None) -> Checkpoint:
         """What an earlier run left unfinished; `units`: of its design variables, by their names."""

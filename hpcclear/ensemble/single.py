@@ -52,14 +52,10 @@ def responses_of(
         records = leading.run_points(ranks, task, rows)
     else:
         keeper = _Keeper(checkpoint, kept or stage, dtype)
+        done, due = keeper.records, keeper.flush_when_due
         with saving(keeper.flush):
             records = leading.run_points(
-                ranks,
-                task,
-                rows,
-                completed=keeper.records,
-                on_records=keeper.take,
-                save=keeper.flush_when_due,
+                ranks, task, rows, completed=done, on_records=keeper.take, save=due
             )
     return records["values"].reshape(len(variants), copies, *shape)
 

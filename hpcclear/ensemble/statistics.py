@@ -65,12 +65,8 @@ def run_statistics(
     began = time.perf_counter()
     if scene.study is None or scene.study.method != "monte-carlo":
         method = None if scene.study is None else scene.study.method
-        raise InputError(
-            "study.method",
-            method,
-            "statistics are streamed for Monte Carlo samples only",
-            'Set method = "monte-carlo" in [study]',
-        )
+        reason = "statistics are streamed for Monte Carlo samples only"
+        raise InputError("study.method", method, reason, 'Set method = "monte-carlo" in [study]')
     tables = [one.name for one in scene.study.variables if one.rows]
     if tables:
         raise InputError(

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import combinations
 from typing import NamedTuple
 
@@ -151,16 +152,13 @@ class Trial:
     def possible(self, off: Variant) -> bool:
         """Whether such effects can be off together."""
         if off not in self._variants:
-            chosen = [self.switches[k] for k in off]
-            if any(one.excludes(other) for one, other in combinations(chosen, 2)):
-                self._variants[off] = None  # two models of one effect
-                return False
-            try:
-                made = Off(self.scene, chosen)
-                problem_of(made.scene)
-                self._variants[off] = made
-            except InputError:
-                self._variants[off] = None
+            self._variants[off], chosen = None, [self.switches[k] for k in off]
+            twice = any(one.excludes(other) for one, other in combinations(chosen, 2))
+            with suppress(InputError):
+                if not twice:  # two models of one effect
+                    made = Off(self.scene, chosen)
+                    problem_of(made.scene)
+                    self._variants[off] = made
         return self._variants[off] is not None
 
     def variant(self, off: Variant) -> Off:
@@ -243,22 +241,17 @@ class Trial:
 
     def payloads(self) -> list[Payload]:
         """What ranks need to compile the whole scene and each effect's absence (`compile_share`)."""
-        asked = [
-            VariantRequest((), 0, 1),
-            *(VariantRequest((k,), 0, 1) for k in range(len(self.switches))),
-        ]
+        variants: list[Variant] = [(), *((k,) for k in range(len(self.switches)))]
+        asked = [VariantRequest(off, 0, 1) for off in variants]
         return [payload_of(self.variant(one.off).scene, self.points(one)) for one in asked]
 
     def certify(self, plan: Screening, simulate: Simulate) -> Certificate:
         """Follow the effect screening to its end; raises what `simulate` does."""
 
-        def answer(wanted: Sequence[VariantRequest]) -> list[VariantResult]:
-            return [
-                self.seen(one, simulate(self.simulated(one.off), self.points(one)))
-                for one in wanted
-            ]
+        def seen(one: VariantRequest) -> VariantResult:
+            return self.seen(one, simulate(self.simulated(one.off), self.points(one)))
 
-        return answered(certificate(plan), answer)
+        return answered(certificate(plan), lambda wanted: [*map(seen, wanted)])
 
     def seconds(self, variants: Sequence[Variant]) -> dict[str, list[float]]:
         """Processor time of a sample of each, by names, measured here in turn: one after the other in every round, s."""
@@ -270,9 +263,8 @@ class Trial:
         found: dict[Variant, list[float]] = {off: [] for off in variants}
         began = time.process_time()
         for number in range(ROUNDS[1]):
-            for off in list(scenes)[
-                :: 1 - 2 * (number % 2)
-            ]:  # there and back: a steady drift cancels
+            way = 1 - 2 * (number % 2)  # there and back: a steady drift cancels
+            for off in list(scenes)[::way]:
                 evaluator = evaluator_of(*scenes[off])
                 evaluator.submit(np.arange(len(points)), points.values)
                 start = time.process_time()

@@ -7,6 +7,7 @@ simulated on all ranks and kept in the checkpoint; a resumed run requests the sa
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,12 +54,8 @@ def check_worn(scene: Scene) -> None:
             "Add [study.random], or simulate one service life",
         )  # fmt: skip
     if scene.study is not None and scene.study.worn and scene.wear.lives == 1:
-        raise InputError(
-            "wear.lives",
-            1,
-            "one service life gives no distribution of clearances",
-            "Simulate more, such as 100",
-        )
+        reason = "one service life gives no distribution of clearances"
+        raise InputError("wear.lives", 1, reason, "Simulate more, such as 100")
     for name in KINDS["wear"].data.keys() | KINDS["wear"].coords.keys():
         if scene.study is not None and name in [row.name for row in scene.study.random]:
             raise InputError(
@@ -133,10 +130,8 @@ class States:
         get = Numbers(scene, inputs)
         fixed = [get(path) for path in free]
         self.names = (*free, *changing)
-        self._new = (
-            np.stack([get.known(path) for path in waves], -1) if waves else np.zeros((get.size, 0))
-        )
-        self._fixed = np.stack(fixed, axis=-1) if fixed else np.empty((get.size, 0))
+        self._new = np.array([get.known(path) for path in waves]).reshape(-1, get.size).T
+        self._fixed = np.array(fixed).reshape(-1, get.size).T
         self._joints = joints
 
     def rows(self, number: int, asked: Asked) -> Array:
@@ -180,12 +175,11 @@ def follow(
     going: dict[int, tuple[Asking, Asked]] = {}
     ended: dict[int, Life] = {}
     for number in range(len(joints.clearance)):
-        asking = life(joints[number], plan, relief)
-        _go_on(number, asking, None, going, ended)
+        _go_on(number, life(joints[number], plan, relief), None, going, ended)
     with LivesProgress("wear", style, len(joints.clearance)) as progress:
         while going:
             progress.lives(len(ended), [asked.done for _, asked in going.values()])
-            answers = _simulated(scene, states, going, ranks, checkpoint, progress, first)
+            answers = _simulated(scene, states, going, first, ranks, checkpoint, progress)
             first += sum(len(one) for one in answers)
             waiting, going = going, {}
             for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
@@ -196,15 +190,10 @@ def follow(
 
 
 def _simulated(
-    scene: Scene,
-    states: States,
-    going: dict[int, tuple[Asking, Asked]],
-    ranks: Ranks,
-    checkpoint: Checkpoint,
-    progress: LivesProgress,
-    first: int,
+    scene: Scene, states: States, going: dict[int, tuple[Asking, Asked]], first: int, *where: Any
 ) -> list[Records]:
-    """Records of what each life requests, as one design; its first simulation has the number `first`."""
+    """Records of what each life requests, as one design; its first simulation has the number `first`. `where`: ranks,
+    checkpoint and progress, as of `sample_points`."""
     rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
     design = np.concatenate(rows)
     late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
@@ -212,9 +201,7 @@ def _simulated(
     for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
         if chosen.any():
             points = states.points(design[chosen])
-            records[chosen] = sample_points(
-                here, points, ranks, checkpoint, progress, stage="wear", first=first
-            )
+            records[chosen] = sample_points(here, points, *where, stage="wear", first=first)
             first += len(points)
     return np.split(records, np.cumsum([len(part) for part in rows])[:-1])
 

@@ -27,15 +27,7 @@ from hpcclear.base.errors import (
 from hpcclear.base.extras import installing
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
-from hpcclear.ranks.stopping import (
-    ANEW,
-    GRACE,
-    RESUMES,
-    Exit,
-    RankFailed,
-    Stopped,
-    StopSwitch,
-)
+from hpcclear.ranks.stopping import ANEW, GRACE, RESUMES, Exit, RankFailed, Stopped, StopSwitch
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import write
 from hpcclear.ranks.watch import SILENCE, Watch, silence
@@ -156,9 +148,7 @@ def _watch(ranks: Ranks) -> Watch:
         else:
             mail.send(0, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
 
-    def orphaned() -> None:
-        stop.request("the process that started it is gone")
-
+    orphaned = functools.partial(stop.request, "the process that started it is gone")
     is_orphan = functools.partial(launcher.is_orphan, parents) if parents else None
     return Watch(mail, seconds, give_up, orphaned, is_orphan)
 
@@ -256,12 +246,9 @@ def _after_mpi() -> Mail:
     """The mailbox of a process that has left MPI: of one process, for without MPI copies do not find each other."""
     variable, copies = launcher.launched_size()
     if copies > 1:
-        raise InputError(
-            variable,
-            copies,
-            "this process has left MPI after an earlier run, and MPI cannot be started twice",
-            "Import mpi4py.MPI at the top of the script, which keeps MPI until the script ends",
-        )
+        reason = "this process has left MPI after an earlier run, and MPI cannot be started twice"
+        remedy = "Import mpi4py.MPI at the top of the script, which keeps MPI until the script ends"
+        raise InputError(variable, copies, reason, remedy)
     return Mail()
 
 

@@ -8,15 +8,7 @@ import numpy as np
 
 from hpcclear.ranks.mailbox import Backoff, Message, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import (
-    COLUMNS,
-    GLANCE,
-    QUANTUM,
-    HandOut,
-    Kept,
-    PointSource,
-    Task,
-)
+from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, HandOut, Kept, PointSource, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.work_queue import WorkQueue

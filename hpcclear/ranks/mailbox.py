@@ -206,9 +206,8 @@ class Mail:
         """End all ranks now; does not return."""
         sys.stderr.flush()
         if self._mpi is not None:
-            self._lock.acquire(
-                timeout=0.2
-            )  # not while another thread is inside MPI, unless it is stuck there
+            # not while another thread is inside MPI, unless it is stuck there
+            self._lock.acquire(timeout=0.2)
             # from a duplicate, or a plain exit, mpiexec at times returns 9, the code of the killed
             self._mpi.COMM_WORLD.Abort(code)
         os._exit(code)

@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Self, TextIO
 
 import numpy as np
@@ -33,7 +33,8 @@ class Progress:
     ) -> None:
         self._label = label
         self._style = style
-        self._interval = log_interval() if interval is None else interval
+        usual = 30.0 if "SLURM_JOB_ID" in os.environ else 5.0  # batch logs are read later
+        self._interval = usual if interval is None else interval
         self._stream = stream
         self._clock = clock
 
@@ -57,9 +58,8 @@ class Progress:
     def refresh(self) -> None:
         """Show the state, if it is time to."""
         now = self._clock()
-        if self._style == "quiet" or now - self._shown < (
-            _BAR_INTERVAL if self._style == "bar" else self._interval
-        ):
+        interval = _BAR_INTERVAL if self._style == "bar" else self._interval
+        if self._style == "quiet" or now - self._shown < interval:
             return
         self._shown = now
         self._history.append((now, self._done))
@@ -97,12 +97,8 @@ class Progress:
         return (self._done - before) / (now - since) if now > since else 0.0
 
     def _eta(self) -> str:
-        rate = self._rate()
-        return (
-            f"{duration((self._total - self._done) / rate)} left"
-            if rate > 0.0
-            else "time left not known"
-        )
+        rate, left = self._rate(), self._total - self._done
+        return f"{duration(left / rate)} left" if rate > 0.0 else "time left not known"
 
     def _write(self, text: str) -> None:
         assert self._stream is not None
@@ -159,11 +155,6 @@ class LivesProgress(LongProgress):
 
     def _share(self) -> float:
         return self._behind
-
-
-def log_interval(environment: Mapping[str, str] = os.environ) -> float:
-    """Seconds between two lines of a log: batch logs are read later and should stay short."""
-    return 30.0 if "SLURM_JOB_ID" in environment else 5.0
 
 
 def duration(seconds: float) -> str:

@@ -149,7 +149,8 @@ class StopSwitch:
 
     def _listen(self) -> None:
         while not self._closing:
-            dues = [due for due in (self._leave_at, self._limit_ahead()) if due is not None]
+            limit = self._limit if self._reason is None else None
+            dues = [due for due in (self._leave_at, limit) if due is not None]
             # the system's calls take no time limit of centuries, nor one of inf
             wait = min(max(0.0, min(dues) - time.monotonic()), LONGEST_WAIT) if dues else None
             ready, _, _ = select.select([self._ear], [], [], wait)
@@ -158,9 +159,6 @@ class StopSwitch:
             if self._leave_at is not None and time.monotonic() >= self._leave_at:
                 self._end(self._code)
             self.is_set()  # looks at the time limit
-
-    def _limit_ahead(self) -> float | None:
-        return self._limit if self._reason is None else None
 
     def _heard(self, number: int) -> None:
         if number not in STOP_SIGNALS:

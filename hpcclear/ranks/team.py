@@ -40,10 +40,7 @@ class Ranks:
         self._writing = Stopwatch()  # output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
-        self._known, self._recent = (
-            b"",
-            np.zeros(2),
-        )  # a kind of worker, and its pace (see `WorkQueue`)
+        self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (`WorkQueue`)
         self.rank = mail.rank
         self.size = mail.size
         self.is_root = mail.rank == 0
@@ -70,25 +67,17 @@ class Ranks:
             return f"{place}, one of {len(samples)} samples in hand: {shown}"
         return f"{place}, sample {shown}" if samples else place
 
-    def stop_requested(self) -> bool:
-        """Whether a signal on any rank or the time limit requests an early end; for root.
-
-        Raises RankFailed if another rank has failed.
-        """
+    def raise_if_stopped(self) -> None:
+        """Raise `Stopped` if a signal on any rank or the time limit requests an early end, RankFailed if another rank failed;
+        for loops of serial code on root."""
         while (message := self.mail.poll()) is not None:
             self.heed(message)
-        return self.stop_switch.is_set()
-
-    def raise_if_stopped(self) -> None:
-        """Raise `Stopped` if requested to end early; for loops of serial code on root."""
-        if self.stop_requested():
+        if self.stop_switch.is_set():
             raise Stopped(self.stop_switch.reason)
 
-    @contextlib.contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str) -> contextlib.AbstractContextManager[Any]:
         """Name what root does inside, for error reports and `stage_seconds`."""
-        with self.timed(name, serial=True):
-            yield
+        return self.timed(name, serial=True)
 
     def writing(self) -> contextlib.AbstractContextManager[None]:
         """Count root's time inside as output of the stage under way."""
