@@ -48,12 +48,8 @@ def default_lanes() -> int:
         vectors = min(VECTORS, first_level_cache() // CACHE_OF_A_VECTOR)
         return max(LEAST_LANES, vectors * doubles_in_a_vector())
     if not (asked.isdecimal() and 1 <= int(asked) <= 1024):
-        raise InputError(
-            "HPCCLEAR_LANES",
-            asked,
-            "is not a number of lanes",
-            "Set it to a whole number from 1 to 1024, or not at all",
-        )
+        remedy = "Set it to a whole number from 1 to 1024, or not at all"
+        raise InputError("HPCCLEAR_LANES", asked, "is not a number of lanes", remedy)
     return int(asked)
 
 
@@ -76,9 +72,8 @@ PERTURBATION_OF_TOLERANCE = 0.1
 
 def alone(rtol: float) -> tuple[int, ...]:
     """Perturbations of replicas of a single response: `PERTURBATIONS_ALONE`, or `PERTURBATIONS` at tight tolerances."""
-    large = (
-        max(map(abs, PERTURBATIONS_ALONE)) * PERTURBATION > 1.001 * PERTURBATION_OF_TOLERANCE * rtol
-    )
+    largest = max(map(abs, PERTURBATIONS_ALONE)) * PERTURBATION
+    large = largest > 1.001 * PERTURBATION_OF_TOLERANCE * rtol
     return PERTURBATIONS if large else PERTURBATIONS_ALONE
 
 
@@ -122,19 +117,17 @@ class Evaluator:
         self._perturbations = tuple(perturbations)
         self._copies = 1 + len(self._perturbations)
         self._objective = objective
-        problem = problem_of(scene)
-        if recorder is not None:
-            self._lanes: Lanes | PrescribedSamples = recorder
+        self._problem = problem = problem_of(scene)
+        self._lanes: Lanes | PrescribedSamples
+        if problem.coordinates:
+            self._lanes = recorder or Lanes(problem, lanes)
         else:
-            self._lanes = (
-                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
-            )
-        self._problem = problem
+            self._lanes = PrescribedSamples(problem)
         self._record, self._pressed = record_of(scene), scene.effects.has_pressure
         self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._values: dict[int, Array] = {}  # of what runs, for its pressures
-        self._partial: dict[int, Records] = {}
+        self._partial: dict[int, dict[int, Records]] = {}  # of samples, copies that came in
 
     @property
     def pending(self) -> int:
@@ -183,11 +176,12 @@ class Evaluator:
         done = []
         for record in records:
             sample, copy = divmod(int(record["sample"]), self._copies)
-            group = self._partial.setdefault(sample, np.zeros(self._copies, self._record))
+            group = self._partial.setdefault(sample, {})
             group[copy] = record
-            group["flags"][copy] |= _ARRIVED
-            if (group["flags"] & _ARRIVED).all():
-                done.append(joined(sample, self._partial.pop(sample), self._objective))
+            if len(group) == self._copies:
+                every = np.array([group[k] for k in range(self._copies)], self._record)
+                done.append(joined(sample, every, self._objective))
+                del self._partial[sample]
         return np.array(done, self._record)
 
 
@@ -240,15 +234,8 @@ def impacts_reported(problem: Problem) -> tuple[str, ...]:
     return tuple(name for name in asked if rigid or name != "rms_frame_force")
 
 
-_ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
-
-
 def with_copies(
-    par: Array,
-    start: Start,
-    labels: Integers,
-    rtol: float,
-    perturbations: Sequence[int] = PERTURBATIONS,
+    par: Array, start: Start, labels: Integers, rtol: float, perturbations: Sequence[int]
 ) -> tuple[Array, Start, Integers]:
     """Each sample followed by its copies: perturbed starts, and stricter tolerances."""
     sizes = np.array([0, *perturbations])
@@ -268,7 +255,6 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     """One record from a sample (first) and its copies: its own numbers, and how far they can be trusted."""
     record = group[0].copy()
     record["sample"] = sample
-    record["flags"] &= ~_ARRIVED
     values = objective.of(group)
     # A copy that failed leaves the uncertainty unknown, and NaN says so.
     coverage = COVERAGE if len(group) == 1 + len(PERTURBATIONS) else COVERAGE_ALONE

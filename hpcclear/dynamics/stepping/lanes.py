@@ -7,15 +7,8 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans, Integers, aligned
 from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.arguments import (
-    Asking,
-    Block,
-    Counter,
-    Method,
-    Queue,
-    numbers_of,
-    rules_of,
-)
+from hpcclear.dynamics.layout import arguments as given
+from hpcclear.dynamics.layout.arguments import Asking, Block, Counter, Method, Queue
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.stepping.explicit.stepper import Codes, make_stepper
@@ -53,9 +46,8 @@ class Lanes:
         self._kept = kept
         self.record = np.zeros((0, columns(n))) if record is None else record
         bank = aligned((at.STAGES + problem.tableau.stages * at.MAX_COORDINATES) * width)
-        bank[at.WORK * width : at.STAGES * width] = (
-            1.0  # parameters: a resting lane divides by them
-        )
+        # parameters: a resting lane divides by them
+        bank[at.WORK * width : at.STAGES * width] = 1.0
         self._block = Block(
             work=bank[: at.WORK * width],
             stages=bank[at.STAGES * width :],
@@ -68,14 +60,14 @@ class Lanes:
         effects = problem.effects._replace(sliding=sliding)
         self._observed = None if observed is None else observed._replace(sliding=sliding)
         measured = effects._replace(impacts=(observed or effects).impacts)
-        self._rules = rules_of(measured, problem.stopping_curves)
+        self._rules = given.rules_of(measured, problem.stopping_curves)
         measures = at.measures_of(observed or problem.effects)
         self._method = Method(
             problem.settings().rows,
             problem.tableau.packed(),
             problem.tables,
             measures,
-            numbers_of(self._rules, width, n, len(measures)),
+            given.numbers_of(self._rules, width, n, len(measures)),
         )
         self._codes = Codes(0, 0, 0)
         self._budget = 256
@@ -100,19 +92,17 @@ class Lanes:
         self._step = make_stepper(self.width, kinds, implicit=stiff)
         implicit = batch_code().address if stiff else 0
         self._codes = Codes(special_code().address, explicit, implicit)
+        numbers = self._method.numbers
         for row, width in zip((Asking.MOTION, Asking.MOTION_OF_EIGHT), widths, strict=True):
-            self._method.numbers[row] = problem.motion(effects, width).address if width else 0
-        self._observer = int(self._method.numbers[Asking.MOTION])
+            numbers[row] = problem.motion(effects, width).address if width else 0
         if self._observed is not None:
             for row, width in zip((Asking.OBSERVING, Asking.OBSERVING_EIGHT), widths, strict=True):
-                address = problem.motion(self._observed, width).address if width else 0
-                self._method.numbers[row] = address
-            self._observer = int(self._method.numbers[Asking.OBSERVING])
+                numbers[row] = problem.motion(self._observed, width).address if width else 0
+        self._observer = int(numbers[Asking.OBSERVING] or numbers[Asking.MOTION])
         if self._rules.profile:
-            self._method.numbers[Asking.PROFILE] = profile_code(effects, self.width).address
-        self._compiled = (
-            True  # last: a stepper must not call what an interrupted compilation left out
-        )
+            numbers[Asking.PROFILE] = profile_code(effects, self.width).address
+        # last: a stepper must not call what an interrupted compilation left out
+        self._compiled = True
 
     def observe(
         self, par: Array, states: Array, contacts: Array, times: Array, began: Array
@@ -245,8 +235,7 @@ class Lanes:
             not self._compiled
         ):  # at the first call, which one rank of a node makes before the others
             self._compile()
-        going = self._step(*self._arguments(budget))
-        return bool(going)
+        return bool(self._step(*self._arguments(budget)))
 
     def collect(self) -> tuple[Integers, Outcome, Array]:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) of what finished since the last call."""
@@ -264,31 +253,27 @@ class PrescribedSamples:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._labels: list[Integers] = []
-        self._par: list[Array] = []
-        self._starts: list[Array] = []
+        nothing = np.zeros((0, problem.parameter_rows)), Start.at_rest(0).rows
+        self._none = np.zeros(0, np.int64), *nothing
+        self._queued = [self._none]  # labels, parameters, starts
 
     @property
     def pending(self) -> int:
         """Samples queued and not collected."""
-        return sum(map(len, self._labels))
+        return sum(len(labels) for labels, _, _ in self._queued)
 
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), m starts, of which only failures count, labels (m,)."""
-        self._par.append(par)
-        self._starts.append(start.rows)
-        self._labels.append(labels)
+        self._queued.append((labels, par, start.rows))
 
     def advance(self, seconds: float) -> None:
         """Nothing takes time."""
 
     def collect(self) -> tuple[Integers, Outcome, Array]:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
-        labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
-        par = np.concatenate([np.zeros((0, self._problem.parameter_rows)), *self._par])
-        start = Start(np.concatenate([Start.at_rest(0).rows, *self._starts]))
-        self._labels, self._par, self._starts = [], [], []
-        return labels, self.run(par, start), par
+        labels, par, starts = map(np.concatenate, zip(*self._queued, strict=True))
+        self._queued = [self._none]
+        return labels, self.run(par, Start(starts)), par
 
     def run(self, par: Array, start: Start) -> Outcome:
         """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""

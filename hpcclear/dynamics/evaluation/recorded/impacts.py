@@ -101,13 +101,8 @@ def measured_of(
     cycle, joints = abs(problem.cycle) or at.TURN, len(scene.joint_labels)
     rigid = not scene.modes
     each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
-    together = by_revolution(
-        periods.mean(keepdims=True),
-        integrals.mean(axis=0, keepdims=True),
-        cycle,
-        joints,
-        rigid=rigid,
-    )
+    means = periods.mean(keepdims=True), integrals.mean(axis=0, keepdims=True)
+    together = by_revolution(*means, cycle, joints, rigid=rigid)
     result = {}
     for name, values in each.items():
         result[f"{name}_by_revolution"] = values

@@ -11,7 +11,6 @@ from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import LEVELS, Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.spectral import LEAST, Spectra
 from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded, Recording, StepInstants
@@ -37,11 +36,7 @@ class SoundingEvaluator:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        columns: Points,
-        lanes: int = DEFAULT_LANES,
-        perturbations: Sequence[int] = (),
+        self, scene: Scene, columns: Points, lanes: int, perturbations: Sequence[int]
     ) -> None:
         self.scene, self.lanes = scene, lanes
         self._columns, self._perturbations = columns, perturbations

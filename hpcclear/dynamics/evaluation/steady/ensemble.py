@@ -8,18 +8,10 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.base.student import student
+from hpcclear.dynamics.evaluation.steady import effort as given
 from hpcclear.dynamics.evaluation.steady import judging
 from hpcclear.dynamics.evaluation.steady.copies import PERTURBATION
-from hpcclear.dynamics.evaluation.steady.effort import (
-    SPEED,
-    STEADY,
-    STRICTER,
-    TIGHTEST,
-    Effort,
-    Mean,
-    Sample,
-    Segment,
-)
+from hpcclear.dynamics.evaluation.steady.effort import STRICTER, Effort, Mean, Sample, Segment
 from hpcclear.dynamics.layout.views import Outcome, Start
 
 LOOSEST = 1e-5
@@ -133,13 +125,13 @@ def ensemble(
         seen = _interval(copies, effort.sample)
         level = target * seen.f
         spent = effort.revolutions >= effort.budget
-        if seen.biased(0.25 * level) and rtol / STRICTER >= TIGHTEST and not spent:
+        if seen.biased(0.25 * level) and rtol / STRICTER >= given.TIGHTEST and not spent:
             if (yield from _tighten(effort, copies, rtol / STRICTER)):
                 rtol = rtol / STRICTER
             segments = 0
             continue
         drifting = seen.settling > 0.5 * level
-        restless = restless + 1 if drifting and seen.moved > STEADY * moved else 0
+        restless = restless + 1 if drifting and seen.moved > given.STEADY * moved else 0
         moved = seen.moved
         early = seen.copies_count and len(copies.outcomes) < LASTING
         met = seen.limit + seen.settling <= level and not early
@@ -215,9 +207,8 @@ def _more(
     count = len(copies.start)
     left = max(effort.budget - effort.revolutions, 0)
     if seen.copies_count:
-        wanted = min(
-            int(count * max(APPROACH * missing - 1.0, LEAST)), 3 * count, left // (SEGMENT * total)
-        )
+        more = int(count * max(APPROACH * missing - 1.0, LEAST))
+        wanted = min(more, 3 * count, left // (SEGMENT * total))
         wanted = max(wanted - wanted % 2, 2)
         new = _new_copies(effort, wanted)
         yield from _extend(effort, new, rtol, total)
@@ -246,9 +237,8 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     total = len(y)
     between = y.var(axis=1, ddof=1)
     chance = float(np.median(between[total // 2 :])) / y.shape[1]  # of the mean over copies
-    first = max(
-        judging.spin_up(y.mean(axis=1), chance), min(judging.parted(between), total // 2), 1
-    )
+    parted = min(judging.parted(between), total // 2)
+    first = max(judging.spin_up(y.mean(axis=1), chance), parted, 1)
     if speeds is not None:
         first = max(first, judging.spin_up(speeds.mean(axis=1)))
     first = min(first, total - 1)  # the budget may end at once
@@ -269,7 +259,7 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     if not pooled:
         limit = float(np.hypot(limit, LEFT * np.sqrt(excess)))
     memory = LONG_MEMORY if sample.latched or sample.free else MEMORY
-    unseen = memory * float(error) * np.sqrt(kept.shape[1] / (SEGMENT * len(kept)))
+    unseen = memory * float(error) * float(np.sqrt(kept.shape[1] / (SEGMENT * len(kept))))
     within = float(kept.var(axis=0, ddof=1).mean()) if len(kept) > 1 else np.nan
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)
@@ -283,22 +273,11 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     short = len(kept) < 3
     moved, settling = (0.0, np.inf) if short else judging.approach(kept)
     if speeds is not None and not short:
-        by_speed = SPEED * mean / abs(float(speeds[first:].mean()))
+        by_speed = given.SPEED * mean / abs(float(speeds[first:].mean()))
         faster, further = judging.approach(speeds[first:])
         moved, settling = max(moved, by_speed * faster), max(settling, by_speed * further)
     return _Interval(
-        first,
-        pooled,
-        mean,
-        limit,
-        float(unseen),
-        bias,
-        doubt,
-        regime,
-        moved,
-        settling,
-        several,
-        short,
+        first, pooled, mean, limit, unseen, bias, doubt, regime, moved, settling, several, short
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
+from hpcclear.base.objectives import RATE, Objective
 from hpcclear.base.outcome import RESPONSES, Flag, Status, failed
 from hpcclear.dynamics.evaluation.evaluator import (
     DEFAULT_LANES,
@@ -142,9 +142,8 @@ class SteadyEvaluator:
         start = start_states(self.scene, par, made)
         numbers = np.asarray(index, np.int64).tolist()
         for k, sample in enumerate(numbers):
-            design = Sample(
-                par[k : k + 1], start[k : k + 1], self._scale, self._latched, self._free
-            )
+            own = slice(k, k + 1)
+            design = Sample(par[own], start[own], self._scale, self._latched, self._free)
             self._asks[sample] = _Ask(sample, points[k], design.par, self._procedure(design))
         self._queue([self._asks[sample] for sample in numbers])
 
@@ -184,9 +183,8 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                record = summed_up(
-                    sample, ask.par, mean, self._record, self._responses, self.scene.objective
-                )
+                about = self._record, self._responses, self.scene.objective
+                record = summed_up(sample, ask.par, mean, *about)
                 yield with_pressures(self.scene, self._columns, [ask.values], record)
             elif ask.asks_anew:
                 going.append(ask)
@@ -205,9 +203,8 @@ _AVERAGED = {*RESPONSES, *_PEAKS, "sliding_work", "sliding_waves"}
 
 
 def summed_up(
-    sample: int, par: Array, mean: Mean, kind: np.dtype, responses: Sequence[str] = (),
-    judged: Objective = MEAN_GAP,
-) -> Records:  # fmt: skip
+    sample: int, par: Array, mean: Mean, kind: np.dtype, responses: Sequence[str], judged: Objective
+) -> Records:
     """What was found as a record (1,): means over segments and copies, of the peaks too unless the motion is regular.
 
     `par` (1, PARAMETERS); `kind`: type of the record (`hpcclear.scene.scene.record_of`); `responses`: as of
@@ -216,14 +213,8 @@ def summed_up(
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:
         return failed(sample, mean.status, int(mean.evaluations), kind)
-    each = outcome_records(
-        np.zeros(len(rows), np.int64),
-        Outcome(rows),
-        np.repeat(par, len(rows), axis=0),
-        kind,
-        responses,
-        judged,
-    )
+    labels, each_par = np.zeros(len(rows), np.int64), np.repeat(par, len(rows), axis=0)
+    each = outcome_records(labels, Outcome(rows), each_par, kind, responses, judged)
     record = each[:1].copy()
     for name in _AVERAGED & {*(kind.names or ())}:
         record[name] = each[name].mean(axis=0)
@@ -248,9 +239,8 @@ def summed_up(
         record["attractors"] = np.nan if mean.attractors is None else mean.attractors
     record["steady_rtol"] = mean.tightest
     record["steady_revolutions"] = mean.revolutions
-    record["latched"] = (
-        each["latched"].mean(axis=0) > 0.5
-    )  # now and then a revolution is, by chance
+    # now and then a revolution is, by chance
+    record["latched"] = each["latched"].mean(axis=0) > 0.5
     record["rhs_evaluations"] = int(mean.evaluations)
     flags = np.bitwise_or.reduce(each["flags"])
     record["flags"] = flags | (0 if mean.met else int(Flag.TARGET_MISSED))

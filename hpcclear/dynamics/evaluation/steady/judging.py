@@ -77,16 +77,8 @@ def windows(gaps: Array, tolerance: float) -> Windows:
     settling = remaining(float(steps[2]), float(steps[1]), believed=0.9)
     before, apart = np.ptp(objective(means[2:]), axis=1)
     late = means[2:].mean(axis=0)
-    return Windows(
-        period,
-        2 * length,
-        late,
-        settling,
-        float(steps[2]),
-        float(steps[1:].max()),
-        float(apart),
-        bool(apart < 0.3 * before),
-    )
+    moved, restless, joining = float(steps[2]), float(steps[1:].max()), bool(apart < 0.3 * before)
+    return Windows(period, 2 * length, late, settling, moved, restless, float(apart), joining)
 
 
 def remaining(moved: float, before: float, believed: float = np.inf) -> float:

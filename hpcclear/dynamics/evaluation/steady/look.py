@@ -2,6 +2,7 @@
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -100,11 +101,8 @@ def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mea
             continue
         growth = _growth(history.apart)
         step = _judge(history, sample, target, rtol)
-        if isinstance(step, _Found) and (step.final or spent):
-            return effort.mean(
-                regime=step.regime, limit=step.limit, outcomes=step.outcomes, segment=1, rtol=rtol,
-                met=step.met, period=step.period, growth=growth,
-            ), growth  # fmt: skip
+        if isinstance(step, dict) and (spent or step["regime"] is not Regime.SETTLING):
+            return effort.mean(**step, segment=1, rtol=rtol, growth=growth), growth
         if step == "irregular" or spent:
             return rtol, growth
         if step == "tighten":
@@ -113,26 +111,14 @@ def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mea
             history = _History(apart=[history.apart[-1]])
 
 
-@dataclass
-class _Found:
-    """A regular motion's mean so far."""
-
-    regime: Regime
-    limit: float
-    outcomes: Outcome
-    met: bool
-    final: bool
-    period: int | None
-
-
-def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_Found | str":
-    """What a look shows at a checkpoint: a mean, or what to do next ("go on", "tighten", "irregular")."""
+def _judge(history: _History, sample: Sample, target: float, rtol: float) -> dict[str, Any] | str:
+    """What a look shows at a checkpoint: what is known of a regular motion's `Mean`, or what to do next ("tighten",
+    "irregular")."""
     gaps = history.gaps()
     revolutions = len(gaps)
     level = target * float(objective(gaps[-1, 2:]).mean())
-    seen = judging.windows(
-        gaps[:, 2:], 0.25 * level
-    )  # of the stricter copies: the others only test the tolerance
+    # of the stricter copies: the others only test the tolerance
+    seen = judging.windows(gaps[:, 2:], 0.25 * level)
     history.moved[revolutions] = seen.moved
     f = objective(seen.gaps)
     loose = objective(gaps[-seen.length :, :2].mean(axis=0))
@@ -141,31 +127,26 @@ def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_F
     if seen.apart > 0.25 * level and revolutions >= PATIENCE and not seen.joining:
         return "irregular"
     settling = max(seen.settling, _of_speed(sample.speeds(history.outcomes), 0.5 * level, f.mean()))
-    settled = settling + perturbation <= 0.5 * level and (
-        seen.period is not None or revolutions >= 32
-    )
+    long = seen.period is not None or revolutions >= 32
+    settled = settling + perturbation <= 0.5 * level and long
     if settled and tolerance > level and rtol / given.STRICTER >= given.TIGHTEST:
         return "tighten"
     if not settled and revolutions >= 4 * CHECKPOINTS[-1] and _drifts(history, level):
-        return _unsteady(history)
+        whole = history.window(revolutions)
+        return {"regime": Regime.UNSTEADY, "limit": np.nan, "outcomes": whole, "met": False}
     limit = settling + perturbation + 0.5 * tolerance  # of the stricter copies, an order better
     outcomes = history.window(seen.length)
-    mean = float(
-        objective(outcomes.mean_gap.mean(axis=(0, 1)))
-    )  # as it is reported with its half-width
+    # as it is reported with its half-width
+    mean = float(objective(outcomes.mean_gap.mean(axis=(0, 1))))
     met = bool(settled and limit <= target * mean)
     orbits = ORBITS if sample.latched and target >= COARSE else 0.0
-    unseen = _unseen(seen, mean, max(TOLERANCES * rtol / given.STRICTER, orbits))
+    # what neither its approach nor its copies show
+    unseen = max(SWINGS * seen.restless, max(TOLERANCES * rtol / given.STRICTER, orbits) * mean)
     half_width = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
-    return _Found(
-        Regime.REGULAR if settled else Regime.SETTLING, half_width, outcomes,
-        met=met, final=settled, period=seen.period if settled else None,
-    )  # fmt: skip
-
-
-def _unseen(seen: judging.Windows, f: float, least: float) -> float:
-    """What a regular mean may be off by that neither its approach nor its copies show, m; at least that share of f."""
-    return max(SWINGS * seen.restless, least * f)
+    found = {"limit": half_width, "outcomes": outcomes, "met": met}
+    if not settled:
+        return {"regime": Regime.SETTLING, **found}
+    return {"regime": Regime.REGULAR, "period": seen.period, **found}
 
 
 def _of_speed(speeds: Array | None, level: float, f: float) -> float:
@@ -178,16 +159,7 @@ def _of_speed(speeds: Array | None, level: float, f: float) -> float:
 def _drifts(history: _History, level: float) -> bool:
     """Whether the average moves on with every doubling of the revolutions, by more than the target."""
     revolutions = len(history.outcomes)
-    moved = [
-        history.moved.get(n, np.nan) for n in (revolutions // 4, revolutions // 2, revolutions)
-    ]
-    return bool(
-        moved[2] > 0.5 * level
-        and moved[2] > given.STEADY * moved[1]
-        and moved[1] > given.STEADY * moved[0]
-    )
-
-
-def _unsteady(history: _History) -> _Found:
-    whole = history.window(len(history.outcomes))
-    return _Found(Regime.UNSTEADY, np.nan, whole, met=False, final=True, period=None)
+    ends = (revolutions // 4, revolutions // 2, revolutions)
+    first, second, last = (history.moved.get(n, np.nan) for n in ends)
+    grows = last > given.STEADY * second and second > given.STEADY * first
+    return bool(last > 0.5 * level and grows)

@@ -122,11 +122,7 @@ def _exponent(logs: Array) -> tuple[float, float]:
 
 
 def _judged(
-    effort: Effort,
-    outcomes: list[Outcome],
-    others: list[Outcome],
-    growth: float,
-    growth_limit: float,
+    effort: Effort, outcomes: list[Outcome], others: list[Outcome], growth: float, doubt: float
 ) -> Mean:
     own = np.stack([outcome.mean_gap for outcome in outcomes])  # (revolutions, copies, 2)
     f = objective(own)
@@ -135,7 +131,7 @@ def _judged(
     means, scatter = _averages(own)
     limit = judging.with_limit(means)[2]
     several = bool(np.ptp(means) > 2.0 * SAME * mean + 6.0 * scatter.max())
-    chaotic = growth > growth_limit and period is None
+    chaotic = growth > doubt and period is None
     regime = Regime.CHAOTIC if chaotic else Regime.SEVERAL if several else Regime.REGULAR
     further = _averages(np.stack([outcome.mean_gap for outcome in others]))
     every, doubts = (np.concatenate([means, further[0]]), np.concatenate([scatter, further[1]]))
@@ -143,7 +139,7 @@ def _judged(
     kept = Outcome(np.stack([outcome.rows for outcome in outcomes]))
     return effort.mean(
         regime=regime, limit=limit, outcomes=kept, segment=1, rtol=RTOL, met=True, period=period, growth=growth,
-        growth_limit=growth_limit, attractors=kinds,
+        growth_limit=doubt, attractors=kinds,
     )  # fmt: skip
 
 
