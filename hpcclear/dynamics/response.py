@@ -22,12 +22,7 @@ from hpcclear.dynamics.evaluation.evaluator import (
 from hpcclear.dynamics.evaluation.recorded.between import seen_between
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import Heard, instants_of
-from hpcclear.dynamics.evaluation.recorded.steps import (
-    ITSELF,
-    Piece,
-    Recorded,
-    Recording,
-)
+from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
@@ -98,9 +93,8 @@ def simulated(
     if coordinate_count(scene) == 0:
         found = _prescribed(scene)
     else:
-        perturbations = (
-            alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
-        )
+        replicated = checked and not copy and steady is None
+        perturbations = alone(scene.numerics.rtol) if replicated else ()
         recording = Recording(scene, (copy,), perturbations, objective)
         collected = Collected(scene, recording.samples[0])
         for rows in recording.chunks():
@@ -183,10 +177,7 @@ def _response(
         "response",
         {"time": times, "joint": labels, **_dimensions(scene), **counted},
         {**data, **reported},
-        named.origin
-        | program()
-        | recorded(named, record)
-        | {"integrator": integrator_of(scene)}
+        {**named.origin, **program(), **recorded(named, record), "integrator": integrator_of(scene)}
         | _kept(scene)
         | _reason(scene, data),
         objective=objective,
@@ -281,9 +272,8 @@ class Collected(Heard):
     """Time series of one sample of a recording, as its steps come; raises InputError where they do not fit into memory."""
 
     def __init__(self, scene: Scene, sample: Recorded) -> None:
-        super().__init__(
-            scene, sample, scene.output.instants_per_revolution, instants_of(scene, sample)
-        )
+        count = scene.output.instants_per_revolution
+        super().__init__(scene, sample, count, instants_of(scene, sample))
         self._parts: list[dict[str, Array]] = []
         self._taken = 0
         self._kept, self._began = kept_revolutions(scene), 0.0
@@ -355,9 +345,8 @@ def _refuse_what_does_not_fit(size: float, count: int) -> None:
     memory = host.memory()
     if size > MOST * memory:
         raise InputError(
-            "output.instants_per_revolution",
-            count,
+            "output.instants_per_revolution", count,
             f"makes time series of {size / 1e9:.3g} GB or more; this machine has {memory / 1e9:.3g} GB of memory",
             "Write fewer instants per revolution (0: every accepted step), or simulate fewer revolutions; "
             "hpcclear sample stores no time series",
-        )
+        )  # fmt: skip

@@ -72,7 +72,7 @@ def assemble(mechanism: Mechanism) -> Assembly:
     loops = Loops(bare, closed=True)
     q, steps = _closed(loops, rough_pose(loops)[:, None], _eccentricities(loops)[:, None])
     jacobian = loops.at(q, np.zeros_like(q), np.zeros(1)).jacobian[0]
-    check_rank(loops, jacobian, _ideal(mechanism, loops), 0.0)
+    check_rank(loops, jacobian, ideal_rows(mechanism, loops), 0.0)
     made = Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
     return made if bare.bodies == mechanism.bodies else _about_centres(made, mechanism)
 
@@ -135,24 +135,26 @@ def assemble_samples(
         good = left <= NEARLY * lengths
         q[:, ~good] = rough[:, ~good]
         jacobian = loops.at(q, np.zeros_like(q), np.zeros(count)).jacobian
-        rows = (jacobian * _columns(loops))[:, _ideal(structure, loops)]
-        good &= _smallest(rows, loops.size) > SINGULAR
+        rows = (jacobian * _scales(loops)[:, None])[:, ideal_rows(structure, loops)]
+        good &= smallest_value(rows, loops.size) > SINGULAR
         return Assembly(loops, q, _velocities(loops, q), steps), good
 
 
-def _columns(loops: Loops) -> Array:
-    """Scales of the Jacobian's columns, (n,) or (m, 1, n)."""
-    return loops.scales if loops.scales.ndim == 1 else loops.scales.T[:, None]
+def _scales(loops: Loops) -> Array:
+    """Scales of the coordinates, (1, n), or those of samples, (m, n)."""
+    return np.atleast_2d(loops.scales.T)
 
 
-def _ideal(mechanism: Mechanism, loops: Loops) -> Booleans:
-    """Which constraints are no clearance and no torque."""
-    return np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
+def ideal_rows(mechanism: Mechanism, loops: Loops) -> Booleans:
+    """Which constraints are neither of a joint with clearance nor of a torque of the mechanism."""
+    clear = {f"joints.{joint.name}" for joint in mechanism.clearances}
+    free = {f"drives.{drive.name}" for drive in mechanism.drives if not drive.prescribed}
+    return np.array([owner not in clear | free for owner in loops.owners], bool)
 
 
 def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> Array:
     """The smallest scaled change (n, m) that gives constraints what is required of them (rows, m)."""
-    inverse = np.linalg.pinv(jacobian * _columns(loops), rcond=rcond)
+    inverse = np.linalg.pinv(jacobian * _scales(loops)[:, None], rcond=rcond)
     change: Array = (inverse @ asked.T[..., None])[..., 0].T
     return change
 
@@ -160,16 +162,8 @@ def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> 
 def _velocities(loops: Loops, q: Array) -> Array:
     """Velocities (n, m) at poses (n, m)."""
     state = loops.at(q, np.zeros_like(q), np.zeros(q.shape[1]))
-    scales = loops.scales if loops.scales.ndim > 1 else loops.scales[:, None]
+    scales = _scales(loops).T
     return _least_change(loops, state.jacobian, -state.rate, 1e-12) * scales
-
-
-def is_open(mechanism: Mechanism, owner: str) -> bool:
-    """Whether a constraint, by its owner, is that of a joint with clearance or of a torque."""
-    table, name = owner.split(".")
-    clear = {joint.name for joint in mechanism.clearances}
-    free = {drive.name for drive in mechanism.drives if not drive.prescribed}
-    return name in (clear if table == "joints" else free)
 
 
 def _eccentricities(loops: Loops) -> Array:
@@ -212,7 +206,7 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, I
     """Newton's method by least changes, shortened until the error falls, of poses (n, m): poses, steps, errors left (m,), and
     their rows."""
     zero, times = np.zeros_like(q), np.zeros(q.shape[1])
-    scales = loops.scales if loops.scales.ndim > 1 else loops.scales[:, None]
+    scales = _scales(loops).T
     length = scales.max(axis=0)
 
     def found(q: Array) -> tuple[Array, Array, Array]:
@@ -285,7 +279,7 @@ def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> fl
     Raises InputError if they depend on one another.
     """
     scaled = (jacobian * loops.scales)[rows]
-    smallest = float(_smallest(scaled, loops.size))
+    smallest = float(smallest_value(scaled, loops.size))
     if smallest > SINGULAR:
         return smallest
     share = np.abs(np.linalg.svd(scaled / _sizes(scaled))[0][:, -1])
@@ -302,7 +296,7 @@ def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> fl
 def check_ranks(loops: Loops, q: Array, v: Array, times: Array) -> Array:
     """Smallest singular values (t,) of all constraints, as of `check_rank`, along a motion (n, t); errors as there."""
     jacobians = loops.at(q, v, times).jacobian
-    found: Array = _smallest(jacobians * loops.scales, loops.size)
+    found: Array = smallest_value(jacobians * loops.scales, loops.size)
     for k in np.flatnonzero(found <= SINGULAR)[:1]:
         check_rank(loops, jacobians[k], np.ones(len(loops.owners), bool), float(times[k]))
     return found
@@ -312,7 +306,7 @@ def _sizes(rows: Array) -> Array:
     return np.linalg.norm(rows, axis=-1)[..., None].clip(1e-300)
 
 
-def _smallest(rows: Array, n: int) -> Array:
+def smallest_value(rows: Array, n: int) -> Array:
     """Smallest singular values (...) of constraints (..., rows, n), rows scaled to 1; 1 without any, 0 of too many."""
     if not rows.shape[-2] or rows.shape[-2] > n:
         return np.full(rows.shape[:-2], float(not rows.shape[-2]))

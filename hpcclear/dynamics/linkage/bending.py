@@ -76,23 +76,19 @@ class Bend:
 
     def _times(self, entry: str, mode: int) -> Term:
         """Row of G ("axial") or B ("spun") times the amplitudes."""
-        total = ZERO
-        for other, amplitude in zip(self.modes, self.q, strict=True):
-            total = total + self._pair(entry, mode, other) * amplitude
+        places = zip(self.modes, self.q, strict=True)
+        total = sum((self._pair(entry, mode, k) * amplitude for k, amplitude in places), ZERO)
         return self._let(f"{entry}{mode}", total)
 
     def _dotted(self, entry: str, others: tuple[Term, ...]) -> Term:
-        total = ZERO
-        for mode, other in zip(self.modes, others, strict=True):
-            total = total + self._times(entry, mode) * other
-        return total
+        both = zip(self.modes, others, strict=True)
+        return sum((self._times(entry, mode) * other for mode, other in both), ZERO)
 
     # ---- places -------------------------------------------------------------------------------------
     def shortening(self) -> Term:
         """delta, m."""
-        total = ZERO
-        for mode, amplitude in zip(self.modes, self.q, strict=True):
-            total = total + self._number(f"nearer_{mode}") * amplitude * amplitude
+        places = zip(self.modes, self.q, strict=True)
+        total = sum((self._number(f"nearer_{k}") * q * q for k, q in places), ZERO)
         return self._let("shorter", _HALF * total)
 
     def nearer(self, mode: int) -> tuple[Term, Term]:
@@ -107,18 +103,20 @@ class Bend:
 
     def end_spin(self, spin: Term, point: str) -> Term:
         """Angular velocity of the end at a point."""
-        for mode, speed in zip(self.modes, self.v, strict=True):
-            spin = spin + self.slope(mode, point) * speed
-        return self._let(f"spin_{point}", spin)
+        places = zip(self.modes, self.v, strict=True)
+        turned = sum((self.slope(mode, point) * speed for mode, speed in places), spin)
+        return self._let(f"spin_{point}", turned)
 
     # ---- inertia ------------------------------------------------------------------------------------
     def moved(self) -> Vector:
         """D, kg m."""
-        across = ZERO
-        for mode, amplitude in zip(self.modes, self.q, strict=True):
-            across = across + self.lateral(mode) * amplitude
+        across = self._sideways(self.q)
         along = -(_HALF * self._dotted("axial", self.q))
         return Vector(self._let("along", along), self._let("across", across))
+
+    def _sideways(self, others: tuple[Term, ...]) -> Term:
+        both = zip(self.modes, others, strict=True)
+        return sum((self.lateral(mode) * other for mode, other in both), ZERO)
 
     def moved_by(self, mode: int) -> Vector:
         """Derivative of D by an amplitude."""
@@ -126,21 +124,14 @@ class Bend:
 
     def moving(self) -> Vector:
         """Rate of D while the bar does not turn."""
-        across = ZERO
-        for mode, speed in zip(self.modes, self.v, strict=True):
-            across = across + self.lateral(mode) * speed
-        return Vector(
-            self._let("vacross", -across), self._let("valong", -self._dotted("axial", self.v))
-        )
+        across = self._let("vacross", -self._sideways(self.v))
+        return Vector(across, self._let("valong", -self._dotted("axial", self.v)))
 
     def gathering(self) -> Term:
         """Second derivative of D along the bar while no amplitude accelerates."""
-        total = ZERO
-        for i, one in zip(self.modes, self.v, strict=True):
-            row = ZERO
-            for j, two in zip(self.modes, self.v, strict=True):
-                row = row + self._pair("axial", i, j) * two
-            total = total + row * one
+        total, speeds = ZERO, [*zip(self.modes, self.v, strict=True)]
+        for i, one in speeds:
+            total = total + sum((self._pair("axial", i, j) * two for j, two in speeds), ZERO) * one
         return self._let("gathering", -total)
 
     def spun(self) -> Term:
@@ -172,10 +163,8 @@ class Bend:
 
     def loss(self) -> Term:
         """Power that damping takes, W."""
-        total = ZERO
-        for mode, speed in zip(self.modes, self.v, strict=True):
-            total = total + self._number(f"damping_{mode}") * speed * speed
-        return total
+        places = zip(self.modes, self.v, strict=True)
+        return sum((self._number(f"damping_{k}") * speed * speed for k, speed in places), ZERO)
 
 
 # ---- numbers --------------------------------------------------------------------------------------------

@@ -24,11 +24,8 @@ def blocks(
             if here in left:
                 left.remove(here)
                 block.append(here)
-                waiting += [
-                    k
-                    for k in left
-                    if matrix.get((here, k), ZERO) or (here, k) in ties or (k, here) in ties
-                ]
+                tied = [k for k in left if (here, k) in ties or (k, here) in ties]
+                waiting += [k for k in left if matrix.get((here, k), ZERO) or k in tied]
         found.append(sorted(block))
     return found
 
@@ -62,20 +59,16 @@ class Elimination:
         }
         self.small = len(block) <= 2 and not held
         self.pivots: list[tuple[int, Term, dict[int, Term], dict[int, Term]]] = []
-        if self.small:
-            if len(block) == 2:
-                self._pair = self._reciprocal()
-        else:
+        if self.small and len(block) == 2:
+            one, two = block
+            a, b, c = self.at(one, one), self.at(one, two), self.at(two, two)
+            self._pair = writer.let("inverse", ONE / (a * c - b * b))
+        elif not self.small:
             self._factor(block[: len(block) - held], block[len(block) - held :])
 
     def at(self, i: int, j: int) -> Term:
         """Entry of the matrix."""
         return self.entries.get((min(i, j), max(i, j)), ZERO)
-
-    def _reciprocal(self) -> Term:
-        one, two = self.block
-        a, b, c = self.at(one, one), self.at(one, two), self.at(two, two)
-        return self.writer.let("inverse", ONE / (a * c - b * b))
 
     def _factor(self, coordinates: list[int], multipliers: list[int]) -> None:
         """Pivots, with the fewest neighbours first: the coordinates, then the multipliers."""
@@ -108,13 +101,10 @@ class Elimination:
 
     def _scales(self, work: Matrix) -> dict[int, Term]:
         """What each pivot that may vanish is compared with: the sum of its joint's, before any of them is taken."""
-        found: dict[int, Term] = {}
-        for pivot, joint in self.passed.items():
-            total = ZERO
-            for k in joint:
-                total = total + work[k, k]
-            found[pivot] = self.writer.let(f"scale_{joint[0]}", total)
-        return found
+        return {
+            pivot: self.writer.let(f"scale_{joint[0]}", sum((work[k, k] for k in joint), ZERO))
+            for pivot, joint in self.passed.items()
+        }
 
     def _inverse(self, pivot: int, diagonal: Term, scale: Term | None) -> Term:
         if scale is not None:

@@ -21,28 +21,12 @@ from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import KINDS, Number
 from hpcclear.dynamics.linkage.trees import forest
 
-
-def sincos(angle: Array) -> tuple[Array, Array]:
-    """Sine and cosine of numbers or arrays, any shape."""
-    return np.sin(angle), np.cos(angle)
-
-
-def sign_of(value: Array) -> Array:
-    """`elements.sign_of` for arrays, any shape."""
-    return np.where(value >= 0.0, 1.0, -1.0)
-
-
-def saturated(value: Array) -> Array:
-    """`friction.saturated` for arrays, any shape."""
-    return np.clip(value, -1.0, 1.0)
-
-
 WORDS: dict[str, Callable[..., object]] = elements.functions() | {
-    "sincos": sincos,
-    "sign_of": sign_of,
-    "saturated": saturated,
+    "sincos": lambda angle: (np.sin(angle), np.cos(angle)),
+    "sign_of": lambda value: np.where(value >= 0.0, 1.0, -1.0),
+    "saturated": lambda value: np.clip(value, -1.0, 1.0),
 }
-"""What texts call, for arrays."""
+"""What texts call, for arrays of any shape."""
 
 
 def on_arrays(
@@ -66,7 +50,7 @@ def of_terms(
     return on_arrays(mechanism, f"def terms(work, par, {results}, i=0, W=1):\n    {text}")
 
 
-def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, ...]]]:
+def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], list[Array]]]:
     """What texts for numpy call for each table of angles: ``table_of_NAME(time)``, its `curves` at times of any shape, from
     the same pieces that the kernel reads."""
     return {
@@ -76,8 +60,8 @@ def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, .
     }
 
 
-def _all_at(pieces: tuple[Pieces, ...], time: Array) -> tuple[Array, ...]:
-    return tuple(one.at(time) for one in pieces)
+def _all_at(pieces: tuple[Pieces, ...], time: Array) -> list[Array]:
+    return [one.at(time) for one in pieces]
 
 
 class State(NamedTuple):

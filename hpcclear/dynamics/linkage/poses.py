@@ -9,7 +9,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
-from hpcclear.dynamics.linkage.expression import Term, Writer, named
+from hpcclear.dynamics.linkage.expression import ZERO, Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -45,7 +45,7 @@ class Poses:
             for r, term in enumerate((*kin.position(centre), *kin.velocity(centre))):
                 lines.append(f"out[{6 * k + r}] = {writer.text(term)}")
             frame = forest.frames[body.name]
-            lines.append(f"out[{6 * k + 4}] = {writer.text(self._angle(kin, frame))}")
+            lines.append(f"out[{6 * k + 4}] = {writer.text(_angle(kin, frame))}")
             lines.append(f"out[{6 * k + 5}] = {writer.text(kin.spin(frame))}")
         first = 6 * len(forest.mechanism.bodies)
         for k, contact in enumerate(forest.mechanism.contacts):
@@ -60,10 +60,6 @@ class Poses:
         self.size = first + 2 * len(forest.mechanism.contacts)
         self._evaluate = of_terms(forest.mechanism, writer, lines, "out")
         self.rows = {name: row for name, row in writer.rows.items() if name in writer.read}
-
-    @staticmethod
-    def _angle(kin: Kinematics, frame: str) -> Term:
-        return Term("0") if frame == GROUND else _needed(kin, frame)
 
     def par_of(self, base: Mapping[str, Number]) -> Array:
         """Parameters (rows,) of this object's rows, by names as of `numbers.values`."""
@@ -93,8 +89,10 @@ class Poses:
         return Pose(x, y, angle + offsets[:, None], vx, vy, spin), eccentricity
 
 
-def _needed(kin: Kinematics, frame: str) -> Term:
+def _angle(kin: Kinematics, frame: str) -> Term:
     """Angle of a frame; of one that a drive prescribes, what it is made from is written down first."""
+    if frame == GROUND:
+        return ZERO
     drive = kin.forest.prescribed.get(frame)
     return named(f"angle_{frame}") if drive is None else kin.driven(drive, frame)[0]
 

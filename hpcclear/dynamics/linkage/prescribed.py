@@ -7,10 +7,11 @@ coordinates (feedback off), all instants at once.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
@@ -24,6 +25,9 @@ from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
+
+Curves = Mapping[str, Callable[[Array], Array]]
+"""Tabulated loads by name, each as a function of the angle (t,), rad, or time (t,), s, that it goes by."""
 
 DIVERGING = 1e-6
 """Force times distance from a change point, rad of the drive, over the largest force further off, from which on it has no
@@ -52,21 +56,18 @@ class Prescribed:
     margin: Array
     """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
 
-    def taken(self, which: Integers) -> "Prescribed":
-        """The same at some of the instants."""
-        parts = ("times", "q", "v", "a", "power", "loss", "load_power", "margin")
-        holds = {name: values[which] for name, values in self.holds.items()}
-        return replace(self, holds=holds, **{name: getattr(self, name)[which] for name in parts})
+    def at(self, times: Array, values_of: Callable[[Array], Array]) -> "Prescribed":
+        """The same at other instants: what makes values there of these, the instants first."""
+        parts = ("q", "v", "a", "power", "loss", "load_power", "margin")
+        holds = {name: values_of(values) for name, values in self.holds.items()}
+        known: dict[str, Any] = {name: values_of(getattr(self, name)) for name in parts}
+        return replace(self, times=times, holds=holds, **known)
 
 
 def prescribed_motion(
-    mechanism: Mechanism,
-    times: Array,
-    gravity: float = 0.0,
-    curves: Mapping[str, Callable[[Array], Array]] | None = None,
+    mechanism: Mechanism, times: Array, gravity: float = 0.0, curves: Curves | None = None
 ) -> Prescribed:
-    """Motion and reactions at instants (t,), s, which rise from 0; `curves`: tabulated loads by name, each as a function of the
-    angle (t,), rad, or time (t,), s, that it goes by; 1 for those left out.
+    """Motion and reactions at instants (t,), s, which rise from 0; tabulated loads that `curves` leave out are 1.
 
     Raises InputError if a joint has clearance or the drives leave something free, and where the mechanism comes to a dead
     centre.
@@ -231,31 +232,18 @@ def _beside(passage: Passage, times: Array) -> tuple[Array, Callable[[Array], Ar
 
 
 def _motion(
-    assembly: Assembly,
-    passage: Passage,
-    times: Array,
-    gravity: float,
-    curves: Mapping[str, Callable[[Array], Array]],
+    assembly: Assembly, passage: Passage, times: Array, gravity: float, curves: Curves
 ) -> Prescribed:
     """Motion and reactions at instants (t,)."""
     shown, filled = _beside(passage, times)
     rows = cartesian(assembly, passage, *passage.at(shown), shown)
     q, v = np.moveaxis(rows, 0, -1)
     margin = check_ranks(assembly.loops, q, v, shown)
-    found = _reactions(assembly, shown, rows, gravity, margin, curves)
-    holds = {name: filled(value) for name, value in found.holds.items()}
-    parts = (found.q, found.v, found.a, found.power, found.loss, found.load_power, found.margin)
-    q, v, a, power, loss, load_power, margin = map(filled, parts)
-    return Prescribed(assembly, times, q, v, a, holds, power, loss, load_power, margin)
+    return _reactions(assembly, shown, rows, gravity, margin, curves).at(times, filled)
 
 
 def _reactions(
-    assembly: Assembly,
-    times: Array,
-    found: Array,
-    gravity: float,
-    margin: Array,
-    tabulated: Mapping[str, Callable[[Array], Array]],
+    assembly: Assembly, times: Array, found: Array, gravity: float, margin: Array, tabulated: Curves
 ) -> Prescribed:
     """Accelerations and reactions from the equations of motion, instants batched as rows of arrays."""
     mechanism, n = assembly.loops.mechanism, assembly.loops.size

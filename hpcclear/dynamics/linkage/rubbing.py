@@ -83,22 +83,15 @@ class Rubbing:
 
     def pushes(self, found: dict[int, Term]) -> list[Term]:
         """Components of the reaction where unknowns are these."""
-        parts = []
-        for rest, slopes in self.reaction:
-            for k, slope in slopes.items():
-                rest = rest + slope * found[k]
-            parts.append(self.writer.let(f"push_{self.joint.name}", rest))
-        return parts
+        name = f"push_{self.joint.name}"
+        return [
+            self.writer.let(name, _along(slopes, found, rest)) for rest, slopes in self.reaction
+        ]
 
     def changes(self, by: dict[int, Term]) -> list[Term]:
         """What the components gain with the unknowns, `by` of each."""
-        found = []
-        for _, slopes in self.reaction:
-            change = ZERO
-            for k, slope in slopes.items():
-                change = change + slope * by[k]
-            found.append(self.writer.let(f"change_{self.joint.name}", change))
-        return found
+        name = f"change_{self.joint.name}"
+        return [self.writer.let(name, _along(slopes, by, ZERO)) for _, slopes in self.reaction]
 
     def known(self, found: dict[int, Term]) -> None:
         """Friction of a reaction whose unknowns are known."""
@@ -273,15 +266,10 @@ def coupled(
     """The unknowns with the friction of joints whose reactions depend on them; `found`: without it."""
     write = factored.writer
     found = {k: write.let(f"free_{k}", term) for k, term in found.items()}
-    moved = [
-        {
-            k: write.let(f"by_{one.joint.name}_{k}", term)
-            for k, term in factored.solve(
-                {k: -(one.ratio * term) for k, term in one.moved.items()}
-            ).items()
-        }
-        for one in rubbing
-    ]
+    moved = []
+    for one in rubbing:
+        by = factored.solve({k: -(one.ratio * term) for k, term in one.moved.items()})
+        moved.append({k: write.let(f"by_{one.joint.name}_{k}", t) for k, t in by.items()})
     free = [one.pushes(found) for one in rubbing]
     changes = [[one.changes(by) for by in moved] for one in rubbing]
     sizes = _sizes(rubbing, free, changes)
@@ -307,15 +295,17 @@ def _sizes(
             ]
         directions = [one.directed(own) for one, own in zip(rubbing, parts, strict=True)]
         matrix = [
-            [
-                (ONE if g == h else ZERO) - _dot(directions[g], changes[g][h])
-                for h in range(len(rubbing))
-            ]
-            for g in range(len(rubbing))
+            [(ONE if g == h else ZERO) - _dot(own, change) for h, change in enumerate(row)]
+            for g, (own, row) in enumerate(zip(directions, changes, strict=True))
         ]
         right = [_dot(one, own) for one, own in zip(directions, free, strict=True)]
         sizes = _solved(write, matrix, right)
     return sizes
+
+
+def _along(slopes: dict[int, Term], unknowns: dict[int, Term], start: Term) -> Term:
+    """Factors of unknowns times these, added to a term."""
+    return _plus(start, slopes.values(), (unknowns[k] for k in slopes))
 
 
 def _plus(start: Term, factors: Iterable[Term], terms: Iterable[Term]) -> Term:

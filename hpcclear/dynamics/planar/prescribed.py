@@ -184,7 +184,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     every = np.sort(np.concatenate([edges, inside]))
     dense = prescribed_motion(mechanism, every, gravity, _curves(scene))
     shown = np.searchsorted(edges, times)
-    found = dense.taken(shown * (1 + len(_NODES)))
+    found = dense.at(times, lambda values: values[shown * (1 + len(_NODES))])
     poses = Poses(found.assembly.loops.forest, {}, 0)
     par = poses.par_of(values(mechanism, cartesian=True, gravity=gravity))
     pose, _ = poses.at(par, found.q.T, found.v.T, times)

@@ -12,7 +12,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, ideal_rows, smallest_value
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import Joint
@@ -146,10 +146,8 @@ def _closes(assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
 def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
     """Whether the constraints of the ideal joints and drives depend on one another at a pose of the twin."""
     pose, loops = pose_at(assembly, walk, node), assembly.loops
-    rows = np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
-    jacobian = (loops.at(pose.q, pose.v, node.time).jacobian * loops.scales)[rows]
-    jacobian = jacobian / np.linalg.norm(jacobian, axis=1)[:, None]
-    return bool(np.linalg.svd(jacobian)[1][-1] < DEPENDENT)
+    jacobian = loops.at(pose.q, pose.v, node.time).jacobian * loops.scales
+    return bool(smallest_value(jacobian[ideal_rows(mechanism, loops)], loops.size) < DEPENDENT)
 
 
 def refused(found: Walk | None) -> tuple[Status, InputError] | None:

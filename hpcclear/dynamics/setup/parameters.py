@@ -13,12 +13,7 @@ from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.planar.prescribed import held_extremes
 from hpcclear.dynamics.planar.problem import is_prescribed, parameters_of
 from hpcclear.dynamics.planar.tolerances import SMOOTH
-from hpcclear.dynamics.setup.further import (
-    further_rows,
-    has_waves,
-    with_further_numbers,
-    with_waves,
-)
+from hpcclear.dynamics.setup import further
 from hpcclear.laws import laws, numbers
 from hpcclear.laws.constant import with_constants
 from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
@@ -42,8 +37,8 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
     p[:, at.EDGE] = _needed_at_edge(scene, get, p)
-    p = with_waves(scene, get, p) if has_waves(scene) else p
-    return with_further_numbers(scene, get, p) if further_rows(scene) else p
+    p = further.with_waves(scene, get, p) if further.has_waves(scene) else p
+    return further.with_further_numbers(scene, get, p) if further.further_rows(scene) else p
 
 
 def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
@@ -55,18 +50,15 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
         fill(scene, get, contact, force, p[:, block:])
         _film_parameters(scene, get, contact, p, block)
     held = scene.responses_asked() and is_prescribed(scene)
-    p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = (
-        held_extremes(scene, points, get.size) if held else np.nan
-    )
+    extremes = held_extremes(scene, points, get.size) if held else np.nan
+    p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = extremes
     return p
 
 
 def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
     """Numbers of a contact's shape."""
-    key = scene.joint_key(label)
-    return GEOMETRIES[scene.clearance_joint(label).geometry].shape(
-        lambda name: get(f"{key}.{name}")
-    )
+    key, geometry = scene.joint_key(label), GEOMETRIES[scene.clearance_joint(label).geometry]
+    return geometry.shape(lambda name: get(f"{key}.{name}"))
 
 
 def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
@@ -176,17 +168,11 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
-        frequency = np.sqrt(_swing(scene, p, place, force) / mass)
+        law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
+        known = numbers.read_from(law, Parameters(p).contact_numbers[..., place, :])
+        frequency = np.sqrt(numbers.swing(law, force, known) / mass)
         needed = np.maximum(needed, mass * frequency / (OF_FORCE * force))
     return (1.0 + pin) * needed
-
-
-def _swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
-    """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
-    law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
-    known = numbers.read_from(law, Parameters(p).contact_numbers[..., place, :])
-    found: Array = numbers.swing(law, force, known)
-    return found
 
 
 def _mass(scene: Scene, get: Numbers) -> Array:

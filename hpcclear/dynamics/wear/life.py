@@ -152,11 +152,9 @@ def _is_over(found: Life, joints: Joints, plan: LifePlan, relief: Relief) -> boo
 
 def _speed(joints: Joints, relief: Relief, here: WearState) -> Array:
     """Growth of the largest clearance around each joint in a revolution, m."""
-    crowded = 1.0 + relief.deepest(relief.waves(joints, here.share)) / np.maximum(
-        joints.slope, 1e-300
-    )
-    speed: Array = crowded * joints.speed(here.work) * here.rate
-    return speed
+    grooves = relief.deepest(relief.waves(joints, here.share))
+    crowded = 1.0 + grooves / np.maximum(joints.slope, 1e-300)
+    return np.asarray(crowded * joints.speed(here.work) * here.rate)
 
 
 def _to_end(joints: Joints, plan: LifePlan, relief: Relief, here: WearState) -> float:
@@ -224,9 +222,8 @@ def _jump(
     state = here.cycle + length, gone, _moved(joints, here, half.share, gone)
     end = yield from _look(found, joints, plan, relief, state, length)
     bent = abs(half.objective - 0.5 * (here.objective + end.objective))
-    known = math.sqrt(
-        half.objective_limit**2 + 0.25 * (here.objective_limit**2 + end.objective_limit**2)
-    )
+    ends = here.objective_limit**2 + end.objective_limit**2
+    known = math.sqrt(half.objective_limit**2 + 0.25 * ends)
     bend = max(bent - known, 0.0) / (plan.tolerance * abs(end.objective))
     grown = float(((clearance - joints.worn(here.work)[0]) / clearance).max())
     # where f leaps, its curve is right once the leap is placed to within the tolerance of the clearance
@@ -282,9 +279,8 @@ def _look(
         if sure or moving or done >= plan.most_copies:
             found.certain &= bool(sure)
             found.drift = max(found.drift, float(node.drift.max()))
-            found.sharpest = max(
-                found.sharpest, relief.sharpest(relief.waves(joints, moments), clearance)
-            )
+            sharpest = relief.sharpest(relief.waves(joints, moments), clearance)
+            found.sharpest = max(found.sharpest, sharpest)
             return node
         wanted = min(2 * done, plan.most_copies)
 
@@ -299,9 +295,8 @@ def _node(state: State, seen: list[WearOutcome]) -> WearState:
     drift = _drift(every)
     sure = student(0.95, len(every) - 1) / math.sqrt(len(every))
     limit = np.hypot(sure * scatter, drift)
-    done = [
-        np.zeros((len(s.work), *moments.shape)) if s.moments is None else s.moments for s in seen
-    ]
+    none = np.zeros(moments.shape)
+    done = [[none] * len(s.work) if s.moments is None else s.moments for s in seen]
     shares = np.concatenate(done) / np.maximum(rates, 1e-300)[..., None]
     return WearState(
         cycle, work, mean[:-1], limit[:-1], float(mean[-1]), float(limit[-1]), peaks.mean(axis=0),

@@ -57,17 +57,10 @@ class Steps:
     def of(cls, rows: Array) -> "Steps":
         """Those of rows of the record (s, columns)."""
         s, n = rec.STATE, (rows.shape[1] - rec.STATE) // 3
-        return cls(
-            rows[:, rec.TIME],
-            rows[:, rec.TURN_TIME],
-            rows[:, rec.REVOLUTION],
-            rows[:, rec.CONTACTS : rec.DRIVE_WORK],
-            rows[:, rec.DRIVE_WORK : rec.MEASURED],
-            rows[:, rec.MEASURED : rec.STATE],
-            rows[:, s : s + n],
-            rows[:, s + n : s + 2 * n],
-            rows[:, s + 2 * n :],
-        )
+        parts = [rec.DRIVE_WORK, rec.MEASURED, s, s + n, s + 2 * n]
+        first, *others = np.split(rows, [rec.CONTACTS, *parts], axis=1)
+        time, turn_time, revolution, _ = first.T
+        return cls(time, turn_time, revolution, *others)
 
 
 @dataclass(frozen=True)
@@ -123,9 +116,8 @@ class Recording:
         alone = not design.names
         par = [parameters(scene, design), *map(parameters, beside)]
         start = [start_states(scene, par[0], design, walk=not alone)]
-        start += [
-            start_states(one, own, walk=False) for one, own in zip(beside, par[1:], strict=True)
-        ]
+        others = zip(beside, par[1:], strict=True)
+        start += [start_states(one, own, walk=False) for one, own in others]
         self._record = record_of(scene)
         self._beside, self._values = beside, design.values
         self._refused = refused_of(scene) if alone else None
