@@ -22,12 +22,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.verdict import Verdict
-from hpcclear.statistics.random.paired import (
-    Change,
-    deviation_change,
-    mean_change,
-    point_change,
-)
+from hpcclear.statistics.random.paired import Change, deviation_change, mean_change, point_change
 
 Variant = tuple[int, ...]
 """Effects that are off, ascending; () is the whole scene."""

@@ -17,13 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from hpcclear.base.errors import (
-    InputError,
-    LimitError,
-    StorageError,
-    check_address_space,
-    mendable,
-)
+from hpcclear.base.errors import InputError, LimitError, StorageError, check_address_space, mendable
 from hpcclear.base.extras import installing
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag

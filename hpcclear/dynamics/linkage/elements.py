@@ -8,15 +8,7 @@ import numpy as np
 from hpcclear.base.bits import no_more
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.curves import (
-    CELL,
-    CELLS,
-    GRID,
-    HALVINGS,
-    HEAD,
-    LAST_CELL,
-    PLACES,
-)
+from hpcclear.dynamics.layout.curves import CELL, CELLS, GRID, HALVINGS, HEAD, LAST_CELL, PLACES
 
 _TINY = 1e-300  # keeps the direction of a vector without length defined (and zero)
 _FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat

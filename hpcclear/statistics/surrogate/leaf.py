@@ -13,11 +13,7 @@ attribute of the model that it holds."""
 
 
 def checked_samples(
-    points: Array,
-    values: Array,
-    bounds: Array,
-    names: Sequence[str] | None,
-    needed: int,
+    points: Array, values: Array, bounds: Array, names: Sequence[str] | None, needed: int
 ) -> tuple[tuple[str, ...], Booleans]:
     """Return the inputs' names (default x1, x2, ...), and which of the samples (n,) count; NaN values are failed samples.
 

@@ -114,12 +114,7 @@ def latin_hypercube(n: int, bounds: Array, rng: np.random.Generator) -> Array:
 
 
 def fit_response_surface(
-    points: ArrayLike,
-    values: ArrayLike,
-    bounds: ArrayLike,
-    order: int,
-    *,
-    chosen: bool = False,
+    points: ArrayLike, values: ArrayLike, bounds: ArrayLike, order: int, *, chosen: bool = False
 ) -> ResponseSurface:
     """Least-squares polynomial of a total order through points (n, d) and values (n,); those that are not finite are dropped.
 
