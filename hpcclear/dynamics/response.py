@@ -19,10 +19,15 @@ from hpcclear.dynamics.evaluation.evaluator import (
     outcome_records,
     responses_reported,
 )
-from hpcclear.dynamics.evaluation.recorded.between import seen_between
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import Heard, instants_of
-from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Recorded, Recording
+from hpcclear.dynamics.evaluation.recorded.steps import (
+    ITSELF,
+    Piece,
+    Recorded,
+    Recording,
+    seen_between,
+)
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of

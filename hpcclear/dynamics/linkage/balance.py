@@ -192,7 +192,6 @@ class Balance:
         if not self.gravity:
             return ZERO
         held: dict[str, Vector] = {}
-        whole = ZERO
         for body in self.forest.mechanism.bodies:
             if body.name in self.falling:
                 continue
@@ -209,8 +208,7 @@ class Balance:
             if body.name in self.kinematics.bends:
                 frame, moved = self.moved_by(body.name).get(column, (GROUND, NOWHERE))
                 held[frame] = held.get(frame, NOWHERE) + moved
-        for frame, moment in held.items():
-            whole = whole + self.kinematics.rotated(frame, moment).y
+        whole = sum((self.kinematics.rotated(*one).y for one in held.items()), ZERO)
         return -(whole * self.writer.parameter("gravity"))
 
     def _turning(self, column: Mover) -> Term:
@@ -237,10 +235,7 @@ class Balance:
         for frame in self.forest.prescribed:
             if turn := self.kinematics.turn(frame):
                 known = known + self.mass(column, Mover("angle", frame)) * turn
-        total = ZERO
-        for rates, found in pairs.items():
-            total = total + self.inner(found, rates)
-        return total - known
+        return sum((self.inner(found, rates) for rates, found in pairs.items()), ZERO) - known
 
     def _thrown(
         self, body: str, point: Point, columns: dict[Mover, Held], column: Mover

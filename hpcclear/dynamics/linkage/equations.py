@@ -211,9 +211,8 @@ class MotionEquations:
 
     def reaction(self, column: Mover, found: dict[int, Term]) -> Term:
         """What has to act along a column that is prescribed."""
-        total = ZERO
-        for k, one in enumerate(self.columns):
-            total = total + self.balance.mass(column, one) * found[k]
+        masses = (self.balance.mass(column, one) * found[k] for k, one in enumerate(self.columns))
+        total = sum(masses, ZERO)
         for r, row in enumerate(self.constraints, len(self.columns)):
             total = total - row.others.get(column, ZERO) * found[r]
         for rub in self.rubbing:

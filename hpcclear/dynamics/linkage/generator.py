@@ -121,22 +121,16 @@ class _Generator(MotionEquations):
             if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
         if on.energies:
-            power = ZERO
-            for drive, moment in zip(self._drives(), moments, strict=True):
-                power = power + moment * self.kinematics.spin(self.forest.frames[drive.body])
-            power = write.let("power", power)
+            spins = [self.kinematics.spin(self.forest.frames[one.body]) for one in self._drives()]
+            products = (moment * spin for moment, spin in zip(moments, spins, strict=True))
+            power = write.let("power", sum(products, ZERO))
             self._rate(at.DRIVE_POWER, power)
             write.line(
                 f"work[{self.rows.rates + at.ABS_DRIVE_POWER} * W + i] = abs({write.text(power)})"
             )
-            loss = ZERO
-            for one in self.losses:
-                loss = loss + one
-            for rub in self.rubbing:
-                loss = loss + rub.force * rub.speed
-            for bend in self.kinematics.bends.values():
-                loss = loss + bend.loss()
-            self._rate(at.DISSIPATION, loss)
+            rubbed = (rub.force * rub.speed for rub in self.rubbing)
+            bent = (bend.loss() for bend in self.kinematics.bends.values())
+            self._rate(at.DISSIPATION, sum((*self.losses, *rubbed, *bent), ZERO))
             self._rate(at.LOAD_POWER, self.load_power)
         if on.follow and (on.series or on.responses or on.objective):
             self._follow(found)

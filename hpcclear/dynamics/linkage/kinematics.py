@@ -262,10 +262,7 @@ class Kinematics:
 
     def position(self, point: Point) -> Vector:
         """Where a point is, along the ground's axes."""
-        found = NOWHERE
-        for frame, arm in point.arms.items():
-            found = found + self.rotated(frame, arm)
-        return found
+        return sum((self.rotated(frame, arm) for frame, arm in point.arms.items()), NOWHERE)
 
     def velocity(self, point: Point) -> Vector:
         """How fast it moves."""

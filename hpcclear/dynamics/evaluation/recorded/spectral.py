@@ -6,8 +6,7 @@ from collections import deque
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.evaluation.recorded.between import seen_between
-from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded
+from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded, seen_between
 from hpcclear.scene import Scene
 from hpcclear.statistics import spectra
 
