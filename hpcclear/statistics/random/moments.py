@@ -105,12 +105,8 @@ class RobustObjective:
             self._draws = lambda designs: drawn
         elif not model.separable:
             label = model.leaves[0].label
-            raise InputError(
-                "surrogate",
-                label,
-                "the model is not a product of functions of single inputs",
-                'use "monte-carlo"',
-            )
+            reason = "the model is not a product of functions of single inputs"
+            raise InputError("surrogate", label, reason, 'use "monte-carlo"')
         else:
             (leaf,) = model.leaves
             self._rule = TensorRule(leaf, self._wiring, tolerance, probes)  # type: ignore[arg-type]
@@ -144,12 +140,8 @@ class RobustObjective:
         leaf = self.model.leaves[0]
         simple = self.model.separable and self._joint is None and not self._wiring.derived
         if not (isinstance(leaf, Kriging) and simple):
-            raise InputError(
-                "model",
-                self.model.names,
-                "the model has no closed form",
-                "compare with Monte Carlo",
-            )
+            reason = "the model has no closed form"
+            raise InputError("model", self.model.names, reason, "compare with Monte Carlo")
         return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
 
     def _drawn(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:

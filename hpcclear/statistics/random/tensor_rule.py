@@ -109,12 +109,9 @@ class TensorRule:
                 else:
                     counts[name] = self._probed(group, name, lengths, tolerance, probes)
                 if counts[name] == 0:
-                    raise InputError(
-                        name,
-                        self.wiring.random[name].law,
-                        f"needs more than {MOST_NODES} nodes: it spans many length scales",
-                        'narrow it, loosen the tolerance, or use "monte-carlo"',
-                    )
+                    reason = f"needs more than {MOST_NODES} nodes: it spans many length scales"
+                    remedy = 'narrow it, loosen the tolerance, or use "monte-carlo"'
+                    raise InputError(name, self.wiring.random[name].law, reason, remedy)
         return counts
 
     def _probed(

@@ -97,12 +97,9 @@ def design_intervals(
     limits, gaps = np.asarray(bounds, float), np.asarray(clearances, float)
     needed = settings.needed(len(limits))
     if settings.n_points <= needed:
-        raise InputError(
-            "n_points",
-            settings.n_points,
-            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
-            f"take at least {needed + 1}, better {2 * needed}",
-        )
+        reason = f"a surface that takes {needed} points leaves nothing to estimate the scatter from"
+        remedy = f"take at least {needed + 1}, better {2 * needed}"
+        raise InputError("n_points", settings.n_points, reason, remedy)
     fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
     middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
     lower = middle - fractions[:, np.newaxis] * half
@@ -139,12 +136,9 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
             freedom[k, c] = surface.degrees_of_freedom
     failed = np.count_nonzero(~np.isfinite(y), axis=2)
     if not freedom.any():
-        raise InputError(
-            "values",
-            int(failed.sum()),
-            "too many simulations failed to fit a surface",
-            "look at their status, correct the cause, or use more points",
-        )
+        reason = "too many simulations failed to fit a surface"
+        remedy = "look at their status, correct the cause, or use more points"
+        raise InputError("values", int(failed.sum()), reason, remedy)
     where, order = (design.intervals, design.clearances), design.settings.order
     return SensitivityHistory(*where, slope, error, r2, rmae, left_out, freedom, failed, order)
 

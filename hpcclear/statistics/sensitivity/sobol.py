@@ -72,12 +72,9 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
     finite = np.isfinite(y).all(axis=0)
     y, replicate = y[:, finite], replicate[finite]
     if y.shape[1] < 2:
-        raise InputError(
-            "values",
-            int(np.count_nonzero(~finite)),
-            "a simulation failed in nearly every row",
-            "look at their status, correct the cause, or narrow the bounds",
-        )
+        reason = "a simulation failed in nearly every row"
+        remedy = "look at their status, correct the cause, or narrow the bounds"
+        raise InputError("values", int(np.count_nonzero(~finite)), reason, remedy)
     first, total = indices = _indices(y)
     reach = _jackknife(y, replicate) * student(confidence, max(len(np.unique(replicate)) - 1, 1))
     intervals = np.stack([indices - reach, indices + reach], axis=-1)

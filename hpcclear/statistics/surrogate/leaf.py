@@ -23,12 +23,9 @@ def checked_samples(
     inside(points, labels, *bounds.T)
     valid = np.isfinite(values)
     if valid.sum() < needed:
-        raise InputError(
-            "values",
-            int(valid.sum()),
-            f"too few valid samples for {points.shape[1]} inputs ({values.size} given)",
-            f"give at least {needed}, better ten times the number of inputs",
-        )
+        reason = f"too few valid samples for {points.shape[1]} inputs ({values.size} given)"
+        remedy = f"give at least {needed}, better ten times the number of inputs"
+        raise InputError("values", int(valid.sum()), reason, remedy)
     return labels, valid
 
 

@@ -67,12 +67,9 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     n_dropped = int(np.count_nonzero(~finite))
     true, predicted = true[finite], predicted[finite]
     if true.size < 2:
-        raise InputError(
-            "test points",
-            true.size,
-            f"accuracy needs at least two finite test values, {n_dropped} failed",
-            "use more test points or correct the failing simulations",
-        )
+        reason = f"accuracy needs at least two finite test values, {n_dropped} failed"
+        remedy = "use more test points or correct the failing simulations"
+        raise InputError("test points", true.size, reason, remedy)
     error, mean = true - predicted, float(true.mean())
     scale = float(np.abs(true).max())
     constant = bool(np.ptp(true) <= ROUNDING * scale)

@@ -76,12 +76,9 @@ class RegressionMethod:
         """
         found = replace(model, source=self.source)
         if not np.array_equal(found.fitted, model.stored["fitted"]):
-            raise InputError(
-                KEY,
-                self.label,
-                "fitted twice to the same points it is two models",
-                "Give it a fixed random_state, and let nothing else in it be random",
-            )
+            reason = "fitted twice to the same points it is two models"
+            remedy = "Give it a fixed random_state, and let nothing else in it be random"
+            raise InputError(KEY, self.label, reason, remedy)
         return found
 
 

@@ -97,12 +97,9 @@ def scale_inputs(points: ArrayLike, bounds: Array) -> Array:
     outside = ~(np.abs(z) <= 1.0 + OUTSIDE)  # true for NaN as well
     if outside.any():
         row = int(np.argmax(outside.any(axis=1)))
-        raise InputError(
-            f"points[{row}]",
-            x[row].tolist(),
-            "a coordinate is not finite or lies outside the bounds",
-            "a surface does not extrapolate: move the point or widen the bounds",
-        )
+        reason = "a coordinate is not finite or lies outside the bounds"
+        remedy = "a surface does not extrapolate: move the point or widen the bounds"
+        raise InputError(f"points[{row}]", x[row].tolist(), reason, remedy)
     return z
 
 
@@ -168,18 +165,12 @@ def _decomposed(design: Array, order: int, n_dropped: int) -> tuple[Array, Array
     n_points, terms = design.shape
     if n_points < terms:
         dropped = f"; {n_dropped} points failed and were dropped" if n_dropped else ""
-        raise InputError(
-            "points",
-            n_points,
-            f"too few: order {order} has {terms} terms{dropped}",
-            f"take at least {terms} points, better twice as many, or a lower order",
-        )
+        reason = f"too few: order {order} has {terms} terms{dropped}"
+        remedy = f"take at least {terms} points, better twice as many, or a lower order"
+        raise InputError("points", n_points, reason, remedy)
     left, singular, right = np.linalg.svd(design, full_matrices=False)
     if singular[-1] <= n_points * np.finfo(float).eps * singular[0]:
-        raise InputError(
-            "points",
-            n_points,
-            f"they do not determine all {terms} terms of order {order}",
-            "give every input more distinct values than the order, or lower the order",
-        )
+        reason = f"they do not determine all {terms} terms of order {order}"
+        remedy = "give every input more distinct values than the order, or lower the order"
+        raise InputError("points", n_points, reason, remedy)
     return left, singular, right

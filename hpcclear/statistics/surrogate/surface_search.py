@@ -75,12 +75,9 @@ class SurfaceSearch:
             return
         self._true = values
         if np.count_nonzero(np.isfinite(values)) < 2:  # before anything is spent on training
-            raise InputError(
-                "test points",
-                len(values),
-                "fewer than two of them have a finite value",
-                "use more test points or correct the failing simulations",
-            )
+            reason = "fewer than two of them have a finite value"
+            remedy = "use more test points or correct the failing simulations"
+            raise InputError("test points", len(values), reason, remedy)
 
     def _try(self) -> None:
         settings = self._settings
@@ -100,12 +97,9 @@ class SurfaceSearch:
             if self.accepted:
                 return
         if self.over and self.best is None:
-            raise InputError(
-                "surrogate",
-                tuple(settings.orders),
-                f"no surface could be fitted: {self._refusal}",
-                "raise max_points, lower the orders, or correct the failing simulations",
-            )
+            reason = f"no surface could be fitted: {self._refusal}"
+            remedy = "raise max_points, lower the orders, or correct the failing simulations"
+            raise InputError("surrogate", tuple(settings.orders), reason, remedy)
 
 
 def fit_until_accepted(

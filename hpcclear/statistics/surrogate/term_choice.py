@@ -43,12 +43,9 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     count, dims = z.shape
     least = least_points(dims)
     if count < least:
-        raise InputError(
-            "points",
-            count,
-            f"too few to choose terms in {dims} inputs by",
-            f"take at least {least}, better ten times the inputs",
-        )
+        reason = f"too few to choose terms in {dims} inputs by"
+        remedy = f"take at least {least}, better ten times the inputs"
+        raise InputError("points", count, reason, remedy)
     linear = exponents_up_to(dims, min(order, 1))
     if order < 2 or np.linalg.matrix_rank(monomials(z, linear)) < len(linear):
         return linear, 0.0  # which the fit refuses if the points do not determine them
