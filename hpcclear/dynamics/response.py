@@ -223,16 +223,9 @@ def _reason(scene: Scene, data: dict[str, Array]) -> dict[str, str | int]:
 
 
 _REPORTED = (
-    "objective",
-    "objective_spread",
-    "objective_uncertainty",
-    "mean_gap",
-    "peak_contact_force",
-    "latched",
-    "rhs_evaluations",
-    "status",
-    "flags",
-)
+    "objective", "objective_spread", "objective_uncertainty", "mean_gap", "peak_contact_force", "latched",
+    "rhs_evaluations", "status", "flags",
+)  # fmt: skip
 """What a response says about itself as a sample does."""
 
 SPUN_UP, SHOWN = 20, 10

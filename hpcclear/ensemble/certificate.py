@@ -282,8 +282,7 @@ def _recommended(book: Book) -> Variant:
 
 def interaction(book: Book, off: Variant) -> Array:
     """By how much the changes (mean, standard deviation, force) of effects together exceed their sum."""
-    together: Array = _values(book, off) - sum((_values(book, (k,)) for k in off), np.zeros(3))
-    return together
+    return _values(book, off) - sum((_values(book, (k,)) for k in off), np.zeros(3))
 
 
 def _values(book: Book, off: Variant) -> Array:

@@ -73,8 +73,7 @@ def shape(get: Get) -> Shape:
 
 def reach(parameters: Parameters, place: int) -> Array:
     """Of a corner's centre from the line, m, shape (...): of samples."""
-    apart: Array = parameters.bearing_radius[..., place] - parameters.journal_radius[..., place]
-    return apart
+    return parameters.bearing_radius[..., place] - parameters.journal_radius[..., place]
 
 
 def corner(

@@ -96,8 +96,7 @@ def shape(get: Get) -> Shape:
 
 def reach(parameters: Parameters, place: int) -> Array:
     """The clearance, m, shape (...): of samples."""
-    found: Array = parameters.clearance[..., place]
-    return found
+    return parameters.clearance[..., place]
 
 
 GEOMETRY = ContactGeometry(

@@ -20,8 +20,7 @@ def shape(get: Get) -> Shape:
 
 def gap_of(joint: Any, which: str, offset: float) -> Array | float:
     """Gap at a wall, m, below 0 in flight, of a pin `offset` to the left of the slot's line."""
-    away: Array | float = WALLS[which] * offset - joint.clearance
-    return away
+    return WALLS[which] * offset - joint.clearance
 
 
 GEOMETRY = ContactGeometry(

@@ -336,5 +336,4 @@ def measures(outcome: Outcome) -> dict[str, Array]:
 
 def _revolution(outcome: Outcome) -> Array:
     """How long one lasts, s, (m, 1)."""
-    duration: Array = (outcome.time / outcome.revolutions)[:, None]
-    return duration
+    return (outcome.time / outcome.revolutions)[:, None]

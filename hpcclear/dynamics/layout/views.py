@@ -32,8 +32,7 @@ class Column:
     def __get__(self, view: "View | None", owner: type) -> int | Array:
         if view is None:
             return self.first
-        values: Array = view.rows[..., self.column]
-        return values
+        return view.rows[..., self.column]
 
     def __set__(self, view: "View", values: Array | float) -> None:
         view.rows[..., self.column] = values
@@ -251,8 +250,7 @@ class Parameters(View):
         """Numbers of the law of contact, shape (..., MAX_JOINTS, LAW_NUMBERS), in the order of its ``read``."""
         blocks = self.rows[..., at.JOINT_BLOCKS : at.OWN]
         blocks = blocks.reshape(*blocks.shape[:-1], at.MAX_JOINTS, at.JOINT_ROWS)
-        numbers: Array = blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
-        return numbers
+        return blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
 
 
 class Rates(View):

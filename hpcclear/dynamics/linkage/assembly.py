@@ -155,8 +155,7 @@ def ideal_rows(mechanism: Mechanism, loops: Loops) -> Booleans:
 def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> Array:
     """The smallest scaled change (n, m) that gives constraints what is required of them (rows, m)."""
     inverse = np.linalg.pinv(jacobian * _scales(loops)[:, None], rcond=rcond)
-    change: Array = (inverse @ asked.T[..., None])[..., 0].T
-    return change
+    return (inverse @ asked.T[..., None])[..., 0].T
 
 
 def _velocities(loops: Loops, q: Array) -> Array:
@@ -310,5 +309,4 @@ def smallest_value(rows: Array, n: int) -> Array:
     """Smallest singular values (...) of constraints (..., rows, n), rows scaled to 1; 1 without any, 0 of too many."""
     if not rows.shape[-2] or rows.shape[-2] > n:
         return np.full(rows.shape[:-2], float(not rows.shape[-2]))
-    found: Array = np.asarray(np.linalg.svd(rows / _sizes(rows), compute_uv=False)[..., -1], float)
-    return found
+    return np.asarray(np.linalg.svd(rows / _sizes(rows), compute_uv=False)[..., -1], float)

@@ -271,8 +271,7 @@ class Bent(NamedTuple):
 
     def raised(self, angle: Array) -> Array:
         """First moment against y = 0 that bending adds, kg m, with the bar at angles (m,)."""
-        found: Array = np.sin(angle) * self.moved[0] + np.cos(angle) * self.moved[1]
-        return found
+        return np.sin(angle) * self.moved[0] + np.cos(angle) * self.moved[1]
 
 
 def bent(

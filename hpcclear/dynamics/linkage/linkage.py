@@ -165,12 +165,7 @@ class Linkage:
         pose, eccentricity = self.poses.at(par, q, v, time)
         bodies = self.mechanism.bodies
         mass, inertia = (
-            np.array(
-                [
-                    np.broadcast_to(par.T[self._given[f"{b.name}_{part}"]], q.shape[-1])
-                    for b in bodies
-                ]
-            )
+            par.T[[self._given[f"{b.name}_{part}"] for b in bodies]].reshape(len(bodies), -1)
             for part in ("mass", "inertia")
         )
         kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
@@ -205,12 +200,8 @@ class Linkage:
         drive = self.forest.prescribed.get(frame)
         if drive is None and frame != self.forest.frames[main.body]:
             with_it = next(names for names in self._coupled if body in names)
-            if main.body in with_it:
-                drive = main
-            else:
-                drive = next(
-                    (d for d in self.forest.prescribed.values() if d.body in with_it), None
-                )
+            drives = main, *self.forest.prescribed.values()
+            drive = next((one for one in drives if one.body in with_it), None)
             return 0.0 if drive is None else gain_of(self.mechanism, drive)
         return gain_of(self.mechanism, drive or main)
 

@@ -38,8 +38,7 @@ def on_arrays(
     """
     names: dict[str, Any] = WORDS | words_of(mechanism) | functions
     exec(source, names)
-    made: Callable[..., None] = names[source[len("def ") : source.index("(")]]
-    return made
+    return names[source[len("def ") : source.index("(")]]
 
 
 def of_terms(
@@ -136,5 +135,4 @@ def typical_length(mechanism: Mechanism) -> Number:
     for points in groups:
         for a, b in combinations(points, 2):
             largest = np.maximum(largest, np.hypot(a[0] - b[0], a[1] - b[1]))
-    found: Number = np.where(largest > 0.0, largest, 1.0)[()]
-    return found
+    return np.where(largest > 0.0, largest, 1.0)[()]

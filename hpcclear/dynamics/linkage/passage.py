@@ -97,8 +97,7 @@ class Passage:
         end = np.minimum(k + 1, len(known) - 1)
         h = (known[end] - known[k])[:, None]
         s = (times - known[k])[:, None] / np.where(h > 0.0, h, 1.0)
-        found: Array = cubic(q[k], v[k] * h, q[end], v[end] * h, s).T
-        return found
+        return cubic(q[k], v[k] * h, q[end], v[end] * h, s).T
 
     def passed(self, times: Array) -> Array:
         """Those of rising instants (t,), s, from 0 that come before the walk's end, 0 at least."""
@@ -136,8 +135,7 @@ def _inverse(loops: Loops, q: Array, time: Array | float) -> tuple[Array, State]
 
 def _margins(inverse: Array) -> Array:
     """Bounds from below of the smallest singular values of matrices, from their inverses (..., n, n)."""
-    found: Array = 1.0 / np.sqrt((inverse**2).sum(axis=(-1, -2)) + 1e-300)
-    return found
+    return 1.0 / np.sqrt((inverse**2).sum(axis=(-1, -2)) + 1e-300)
 
 
 class _Walker:
@@ -268,8 +266,7 @@ def _recurs(loops: Loops, first: Array, last: Array, within: float = 1e-6) -> Bo
     apart = ((last - first).T / loops.scales).T
     angles = [one.kind == "angle" for one in loops.forest.coordinates]
     apart[angles] -= 2 * math.pi * np.round(apart[angles] / (2 * math.pi))
-    same: Booleans = np.abs(apart).max(axis=0, initial=0.0) < within
-    return same
+    return np.abs(apart).max(axis=0, initial=0.0) < within
 
 
 def _through(walker: _Walker, found: Passage, here: WalkPose, end: float) -> WalkPose:

@@ -60,8 +60,7 @@ def stored_energy(
     each = on * numbers.stored(
         law, depth, numbers.read_from(law, Parameters(par).contact_numbers[..., places, :])
     )
-    total: Array = each.sum(axis=-1)
-    return total
+    return each.sum(axis=-1)
 
 
 def _depth(

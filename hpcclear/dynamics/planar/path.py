@@ -69,8 +69,7 @@ def _path(ideal: Mechanism, place: str) -> Path:
     times = share * drive.seconds
     q, v = np.moveaxis(passed_through(assembly, times), 0, -1)
     where, speed, *_ = placed(replace(assembly, q=q, v=v), place)
-    path: Path = CubicHermiteSpline(share, where, speed * drive.seconds)
-    return path
+    return CubicHermiteSpline(share, where, speed * drive.seconds)
 
 
 def ideal_path(mechanism: Mechanism, place: str) -> Path | None:

@@ -148,8 +148,7 @@ def violation(linkage: Linkage, q: Array, v: Array, time: Array) -> Array:
     loops = linkage.loops
     joints = [owner.startswith("joints.") for owner in loops.owners]
     error = loops.at(q, v, time).error * (loops.length / loops.row_scales)[:, None]
-    found: Array = np.abs(error[joints]).max(axis=0, initial=0.0)
-    return found
+    return np.abs(error[joints]).max(axis=0, initial=0.0)
 
 
 def balance_series(

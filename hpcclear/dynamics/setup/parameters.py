@@ -146,8 +146,7 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     own[:, at.FILM_SCALE] = numbers.evaluate(law.scale, given | {"clearance": clearance})
     own[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
     own[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
-    masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
-    inertia = sum(get(path) for path in masses) * p[:, at.DRIVEN_LENGTH] * p[:, at.SPEED] ** 2
+    inertia = _mass(scene, get) * p[:, at.DRIVEN_LENGTH] * p[:, at.SPEED] ** 2
     own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SCALE] / inertia
 
 
@@ -177,8 +176,8 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
 
 def _mass(scene: Scene, get: Numbers) -> Array:
     """All masses together, kg, (samples,)."""
-    total: Array = sum(get(path) for path in scene.numeric_paths() if path.endswith(".mass"))  # type: ignore[assignment]
-    return total
+    masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
+    return sum(map(get, masses), np.zeros(get.size))
 
 
 def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:

@@ -142,8 +142,7 @@ class Lanes:
     def running(self) -> Booleans:
         """Which lanes hold a sample, shape (width,)."""
         row = at.RUNNING * self.width
-        running: Booleans = self._block.work[row : row + self.width] == 1.0
-        return running
+        return self._block.work[row : row + self.width] == 1.0
 
     @property
     def waiting(self) -> int:

@@ -23,8 +23,7 @@ def kernel(waves: int) -> Array:
     """l_1 to l_H of the narrowest sum of H waves that is never negative, shape (waves,)."""
     a = np.sin(np.pi * np.arange(1, waves + 2) / (waves + 2))
     every = np.correlate(a, a, mode="full")[waves:]
-    weights: Array = every[1:] / every[0]
-    return weights
+    return every[1:] / every[0]
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ class Relief:
         """Waves of worn surfaces, m, for moments in J as of `Joints.counted`."""
         slopes = [np.repeat(one[..., None], 2 * count, axis=-1) for one, count in
                   ((joints.bearing, self.bearing), (joints.journal, self.journal))]  # fmt: skip
-        found: Array = np.concatenate(slopes, axis=-1) * self._weights * moments
-        return found
+        return np.concatenate(slopes, axis=-1) * self._weights * moments
 
     def around(self, waves: Array, angles: Array = LOOKED_AT) -> Array:
         """Depths beside the mean at angles, m, shape (..., joints, 2, angles): of bearing and journal."""
@@ -74,8 +72,7 @@ class Relief:
         """By how much both surfaces together are deeper than on the mean where each is deepest, m, (..., joints)."""
         if not self.size:
             return np.zeros(waves.shape[:-1])
-        found: Array = self.around(waves, angles).max(axis=-1).sum(axis=-1)
-        return found
+        return self.around(waves, angles).max(axis=-1).sum(axis=-1)
 
     def sharpest(self, waves: Array, clearance: Array) -> float:
         """Curvature of grooves over that of the clearance circle there at most: from 1 on a journal touches their edges."""

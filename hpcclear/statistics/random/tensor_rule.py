@@ -46,17 +46,9 @@ class TensorRule:
             at, weights = self._nodes(group, designs)
             shares.append(weights)
             places.append(self._in_unit(group, at).reshape(count, at.shape[1] * at.shape[2]))
-        found = tensor_moments(
-            np.concatenate(places, axis=1),
-            np.concatenate(shares, axis=1),
-            self.sizes,
-            self.starts,
-            self.dims,
-            self.steady,
-            self.steady_shares,
-            leaf.packed[0],
-            leaf.length_scales,
-        )
+        nodes, chances = (np.concatenate(one, axis=1) for one in (places, shares))
+        groups = self.sizes, self.starts, self.dims, self.steady, self.steady_shares
+        found = tensor_moments(nodes, chances, *groups, leaf.packed[0], leaf.length_scales)
         return leaf.mean + found[:, 0], found[:, 1]
 
     def _nodes(self, group: Group, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,12 +92,8 @@ class TensorRule:
             simple = not any(self.wiring.names[dim] in self.wiring.derived for dim in group.dims)
             for name in group.sources:
                 if simple:
-                    counts[name] = nodes_needed(
-                        self.wiring.random[name].law,
-                        float(lengths[group.dims[0]]),
-                        tolerance,
-                        MOST_NODES,
-                    )
+                    law, length = self.wiring.random[name].law, float(lengths[group.dims[0]])
+                    counts[name] = nodes_needed(law, length, tolerance, MOST_NODES)
                 else:
                     counts[name] = self._probed(group, name, lengths, tolerance, probes)
                 if counts[name] == 0:
@@ -136,16 +124,13 @@ class TensorRule:
             nodes, weights = rule(wiring.random[name].law, count)
             out = []
             for level in levels:
-                draws = {
-                    other: np.array([[value]]) for other, value in zip(others, level, strict=True)
-                }
-                at = wiring.places(dims, designs, draws | {name: nodes[None]})[:, :, None] / narrow
-                about = (
-                    wiring.places(dims, designs, draws | {name: centres[None]})[:, None] / narrow
+                draws = {k: np.array([[value]]) for k, value in zip(others, level, strict=True)}
+                at, about = (
+                    wiring.places(dims, designs, draws | {name: one[None]}) / narrow
+                    for one in (nodes, centres)
                 )
-                out.append(
-                    np.einsum("j,njc->nc", weights, np.exp(-0.5 * ((at - about) ** 2).sum(-1)))
-                )
+                squares = ((at[:, :, None] - about[:, None]) ** 2).sum(-1)
+                out.append(np.einsum("j,njc->nc", weights, np.exp(-0.5 * squares)))
             return np.array(out)
 
         centres = np.linspace(*wiring.random[name].law.span, 5)

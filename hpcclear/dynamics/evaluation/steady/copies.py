@@ -48,5 +48,4 @@ def perturbed(start: Start, scale: Array, numbers: range, size: float = PERTURBA
 def separation(first: Start, second: Start, scale: Array) -> Array:
     """Distance of two states over scale, root mean square, shape (rows,)."""
     n = len(scale) // 2
-    apart: Array = np.sqrt(np.mean(((second.state(n) - first.state(n)) / scale) ** 2, axis=-1))
-    return apart
+    return np.sqrt(np.mean(((second.state(n) - first.state(n)) / scale) ** 2, axis=-1))
