@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import kind_of
-from hpcclear.base.pieces import breaks, level, mean_of, periodic
+from hpcclear.base.pieces import breaks, level, periodic
 from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
 from hpcclear.dynamics.linkage.elements import enter_table, look_up
@@ -199,9 +199,8 @@ def test_means_are_those_of_the_curve_that_acts(interpolation):
         x = np.sort(rng.uniform(-TURN, TURN * (turns - 1), 9))
         rows = tuple(zip(x, rng.normal(size=9), strict=True))
         right = integral(rows, 0.0, TURN * turns, TURN * turns, linear=interpolation == "linear")
-        assert mean_of(rows, TURN * turns, interpolation) == pytest.approx(
-            right / TURN / turns, abs=1e-12
-        )
+        mean = periodic(rows, TURN * turns, interpolation).mean()
+        assert mean == pytest.approx(right / TURN / turns, abs=1e-12)
 
 
 def looked_up(table, curve, shares):

@@ -87,11 +87,6 @@ def level(rows: Rows, interpolation: str = "smooth") -> Pieces:
     return Pieces(x, cubics, length, repeats=False)
 
 
-def mean_of(rows: Rows, length: float, interpolation: str = "smooth") -> float:
-    """Mean of the curve that acts where a table ((place, value), ...) repeats after a length in the unit of its places."""
-    return periodic(rows, length, interpolation).mean()
-
-
 def hinges(name: str, rows: Rows) -> dict[str, float]:
     """Parameters of a table that runs straight from row to row and stays level beyond: first value, places and bends."""
     x, y = np.array(rows).T

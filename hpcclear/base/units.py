@@ -196,12 +196,9 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
         check_thousands(text)
     if found is None or (unit is not None and not _is_written(text, unit)):
         hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
-        raise UnitError(
-            f"the text is not a number with a unit of {shown}",
-            mended(text)
-            or f"Write a number in {shown}"
-            + (f", or a string with a unit{hint}" if target else ""),
-        )
+        reason = f"the text is not a number with a unit of {shown}"
+        units = f", or a string with a unit{hint}" if target else ""
+        raise UnitError(reason, mended(text) or f"Write a number in {shown}{units}")
     if unit is None:
         reason = "a number in quotes has no unit"
         raise UnitError(reason, f"Drop the quotes for a number in {shown}")

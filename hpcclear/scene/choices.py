@@ -151,11 +151,10 @@ class Cost(Table):
             return
         needed = {"reciprocal": ("at", "cost"), "exponential": ("at", "cost", "scale")}
         if self.law is None:
-            raise invalid(
-                "the law of the cost is missing",
-                'Write law = "reciprocal" or "exponential", or a list with the cost of each option',
-                "law",
+            remedy = (
+                'Write law = "reciprocal" or "exponential", or a list with a cost for each option'
             )
+            raise invalid("the law of the cost is missing", remedy, "law")
         for key in needed[self.law]:
             if getattr(self, key) is None:
                 raise invalid(f"the law {self.law!r} needs it", "Add it", key)

@@ -122,11 +122,11 @@ class ConsistentTables(SceneTables):
                 if length_path(self.clearance_joint(name)) is None:
                     is_pin = name in self.pins()
                     entry, part = ("length", "bearing") if is_pin else ("width", "slider")
-                    raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
-                        f'Add {entry} = "20 mm" or so to the joint',
-                        f"{self.joint_key(name)}.{entry}",
+                    reason = (
+                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}'
                     )
+                    remedy = f'Add {entry} = "20 mm" or so to the joint'
+                    raise invalid(reason, remedy, f"{self.joint_key(name)}.{entry}")
         if clearance and contact is None:
             law = 'contact = { law = "lankarani-nikravesh", restitution = 0.9 }'
             remedy = f'Add {law}, or make the joints ideal (kind = "ideal")'
@@ -161,11 +161,9 @@ class ConsistentTables(SceneTables):
             reason = "a study names its objective itself"
             raise invalid(reason, "Write study.objective instead", "numerics.objective")
         if chosen and not self.objective.of_joints:
-            raise invalid(
-                f'study.objective = "{self.objective.name}" is of no joint',
-                "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
-                key=key,
-            )
+            known = "mean-gap, mean-contact-force or peak-contact-force"
+            reason = f'study.objective = "{self.objective.name}" is of no joint'
+            raise invalid(reason, f"Leave the joints out, or choose {known}", key)
 
     def _check_target(self) -> None:
         if self.numerics.target_error is None or not self.clearance_joints():

@@ -99,8 +99,5 @@ def check_period(pairs: Rows, turns: int, key: str) -> None:
         remedy = f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}"
         raise invalid(f"the table is longer than {length}", remedy, key)
     if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
-        raise invalid(
-            f"the curve repeats every {'turn' if turns == 1 else length}, but its last value differs from its first",
-            "Make both equal, or leave the last row out",
-            key=key,
-        )
+        reason = f"the curve repeats every {length}, but its last value differs from its first"
+        raise invalid(reason, "Make both equal, or leave the last row out", key)

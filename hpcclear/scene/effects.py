@@ -120,12 +120,8 @@ class EffectTables(Table):
             return data
         for key in ("friction", "guide_friction"):
             if isinstance(data.get(key), str) and data[key] != "none":
-                raise invalid(
-                    'a table is expected here, or "none"',
-                    'Write "none" to switch it off, or a table such as { coefficient = 0.01 }'
-                    + (' with law = "coulomb"' if key == "friction" else ""),
-                    key=key,
-                    value=data[key],
-                )
+                also = ' with law = "coulomb"' if key == "friction" else ""
+                remedy = f'Write "none", or a table such as {{ coefficient = 0.01 }}{also}'
+                raise invalid('a table is expected here, or "none"', remedy, key, data[key])
         words = ("contact", "friction", "slider_load", "guide_friction")
         return {key: value for key, value in data.items() if not (key in words and value == "none")}

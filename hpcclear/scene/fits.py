@@ -129,10 +129,10 @@ def fit_of(text: object) -> Fit:
     shaft = _limits(size, found["shaft"], int(found["shaft_grade"]))
     low, high = hole[0] - shaft[1], hole[1] - shaft[0]
     if low < 0.0:
-        raise invalid(
-            f"leaves from {low:.4g} to {high:.4g} um between both diameters: without clearance there is no such joint",
-            "Choose a looser fit such as H7/g6, or a joint without clearance",
+        reason = (
+            f"leaves {low:.4g} to {high:.4g} um between both diameters: no clearance for a joint"
         )
+        raise invalid(reason, "Choose a looser fit such as H7/g6, or a joint without clearance")
     return Fit(size, hole, shaft)
 
 
@@ -233,11 +233,9 @@ def law_of(entries: Content) -> tolerances.FitClearance:
     low, high = law.span
     if not 1e-10 < low < high:  # of two diameters, with rounding
         shown = f"from {1e6 * low:.4g} to {1e6 * high:.4g} um"
-        raise invalid(
-            f"leaves radial clearances {shown}, and a joint with clearance needs one above 0 in every machine",
-            "Choose a looser fit, or cut it off with range = [smallest, largest]",
-            "fit" if fit else "bore",
-        )
+        reason = f"leaves radial clearances {shown}, and every machine needs one above 0"
+        remedy = "Choose a looser fit, or cut it off with range = [smallest, largest]"
+        raise invalid(reason, remedy, "fit" if fit else "bore")
     return law
 
 

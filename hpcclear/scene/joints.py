@@ -94,12 +94,9 @@ class PinInBearing(Table):
     def _check(self) -> None:
         """A journal is left, and film and waves fit into the clearance."""
         if self.clearance >= self.bearing_radius:
-            raise invalid(
-                f"the clearance must be smaller than the bearing radius ({shown(self.bearing_radius, 'm')}), "
-                "or no journal is left",
-                "Write the radial clearance R_B - R_J",
-                "clearance",
-            )
+            radius = shown(self.bearing_radius, "m")
+            reason = f"must be smaller than the bearing radius ({radius}): no journal is left"
+            raise invalid(reason, "Write the radial clearance R_B - R_J", "clearance")
         check_film(self.film, self.clearance, self.bearing_radius)
         check_waves(self.out_of_round, self.clearance, self.film)
 
@@ -197,11 +194,9 @@ class Guide(OfContacts):
         for entry in ("length", "height"):
             size, radius = getattr(self, entry), self.corner_radius
             if radius is not None and 2.0 * radius >= size:
-                raise invalid(
-                    f"both corners of a side must fit into the slider's {entry} ({shown(size, 'm')})",
-                    f"Write less than half of the {entry}, such as 1 mm",
-                    "corner_radius",
-                )
+                reason = f"both corners of a side must fit into its {entry} ({shown(size, 'm')})"
+                remedy = f"Write less than half of the {entry}, such as 1 mm"
+                raise invalid(reason, remedy, "corner_radius")
 
 
 class SliderGuide(Guide):

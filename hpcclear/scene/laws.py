@@ -198,13 +198,10 @@ class LawTable(Table):
             if key in cls.model_fields or key in entries or (law is None and key in others):
                 continue
             if law is not None and law.name == "none" and key in others:
-                raise invalid(
-                    'the law "none" has no parameters, and a parameter says that friction is meant',
-                    f'Write {cls.kind} = "none" (--set effects.{cls.kind}=none) to switch it off, '
-                    'or set law = "coulomb"',
-                    key="law",
-                    value="none",
-                )
+                off = f'{cls.kind} = "none" (--set effects.{cls.kind}=none)'
+                remedy = f'Write {off} to switch it off, or set law = "coulomb"'
+                reason = 'the law "none" has no parameters, and one says that friction is meant'
+                raise invalid(reason, remedy, "law", "none")
             if law is not None and key in law.elsewhere:
                 reason, remedy = law.elsewhere[key]
                 raise invalid(reason, remedy, key)
@@ -226,12 +223,9 @@ class LawTable(Table):
             value = data.get(parameter.name, parameter.default)
             if value is None:
                 example = parameter.example or f"a number in {parameter.unit or 1}"
-                raise invalid(
-                    f"the law {law.name!r} needs "
-                    + (f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"),
-                    f"Add {parameter.name} = {example} or so",
-                    parameter.name,
-                )
+                what = f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"
+                remedy = f"Add {parameter.name} = {example} or so"
+                raise invalid(f"the law {law.name!r} needs {what}", remedy, parameter.name)
             found[parameter.name] = _value(parameter, value)
             if theirs and parameter.count == 1:
                 quantity = quantity_of(parameter)

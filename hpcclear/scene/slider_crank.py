@@ -88,12 +88,11 @@ class SliderCrank(Table):
         offset = abs(self.offset or 0.0)
         if self.rod.length <= self.crank.length + offset:
             beside = f" and the offset ({shown(offset, 'm')})" if offset else ""
-            raise invalid(
-                f"the rod must be longer than the crank ({shown(self.crank.length, 'm')}){beside}, "
-                "or the crank cannot rotate",
-                "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
-                "rod.length",
+            least = (
+                f"the rod must be longer than the crank ({shown(self.crank.length, 'm')}){beside}"
             )
+            remedy = "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset)
+            raise invalid(f"{least}, or the crank cannot rotate", remedy, "rod.length")
 
 
 Drive = Annotated[CrankSpeed | CrankTorque, Field(discriminator="kind")]

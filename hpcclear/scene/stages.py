@@ -233,11 +233,9 @@ class Verification(Table):
 
     def _check(self) -> None:
         if self.method == "qmc" and self.samples is not None:
-            raise invalid(
-                "the number of points of a Sobol sequence follows from the accuracy",
-                'Leave it out and set study.accuracy or most_samples, or write method = "monte-carlo"',
-                "samples",
-            )
+            reason = "the number of points of a Sobol sequence follows from the accuracy"
+            remedy = 'Set study.accuracy or most_samples, or write method = "monte-carlo"'
+            raise invalid(reason, remedy, "samples")
 
     @property
     def draws(self) -> int | None:

@@ -92,11 +92,9 @@ class Study(StudyTables):
 
     def _check_width(self, row: RandomInput) -> None:
         if row.worn and row.name not in self.names:
-            raise invalid(
-                "worn clearances are not a variable of this study and would have no effect",
-                f"Add study.variables.{row.name} with a range that contains them, or leave it out",
-                key=f"random.{row.name}",
-            )
+            reason = "worn clearances are no variable of this study, and would have no effect"
+            remedy = f"Add study.variables.{row.name} with a range that contains them"
+            raise invalid(reason, f"{remedy}, or leave it out", f"random.{row.name}")
         if row.name not in self.names:
             return
         if self.variable(row.name).ratio is not None:
@@ -115,13 +113,12 @@ class Study(StudyTables):
         else:
             inside = bool(row.relative) or self.moves(row) or high - low <= upper - lower + slack
         if not inside:
-            raise invalid(
-                "the distribution is wider than its domain, "
-                f"{row.name} from {lower:g} to {upper:g}",
-                f"Narrow it, or widen study.variables.{row.name}.range"
-                + (f", so that it contains {low:.4g} to {high:.4g}" if row.absolute else ""),
-                key=f"random.{row.name}",
+            reason = (
+                f"the distribution is wider than its domain, {row.name} from {lower:g} to {upper:g}"
             )
+            remedy = f"Narrow it, or widen study.variables.{row.name}.range"
+            remedy += f", so that it contains {low:.4g} to {high:.4g}" if row.absolute else ""
+            raise invalid(reason, remedy, f"random.{row.name}")
 
     def _check_correlation(self) -> None:
         known = tuple(row.name for row in self.random)
@@ -141,22 +138,19 @@ class Study(StudyTables):
                     remedy = "Add it to study.variables and to study.surrogate.optimisation"
                     raise invalid(reason, remedy, f"cases.{case.name}")
             if not self.design_variables(case.name):
-                raise invalid(
-                    "every variable of this case has an absolute distribution,  "
-                    "so no design variable is left",
-                    "Add a study variable, or give a half_width instead of a range",
-                    key=f"cases.{case.name}",
+                reason = (
+                    "every variable of this case has an absolute distribution, so no design is left"
                 )
+                remedy = "Add a study variable, or give a half_width instead of a range"
+                raise invalid(reason, remedy, f"cases.{case.name}")
             self._check_goals(case)
 
     def _check_goals(self, case: Case) -> None:
         own = self.design_variables(case.name)
         if self.swarm.archive < len(case.goals):
-            raise invalid(
-                f"case {case.name} has {len(case.goals)} objectives, each with a best design of its own",
-                f"Request {len(case.goals)} solutions or more",
-                "swarm.archive",
-            )
+            count = len(case.goals)
+            reason = f"case {case.name} has {count} objectives, each with a best design of its own"
+            raise invalid(reason, f"Request {count} solutions or more", "swarm.archive")
         for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
             for k, goal in enumerate(rows):
                 key = f"cases.{case.name}.{table}.{k}"
@@ -174,11 +168,9 @@ class Study(StudyTables):
                 if goal.statistic == "cost":
                     priced = tuple(one for one in self.variables if one.name in own and one.priced)
                     if not priced:
-                        raise invalid(
-                            "no design variable of this case has a cost",
-                            'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one, say',
-                            key=f"{key}.statistic",
-                        )
+                        remedy = 'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one'
+                        reason = "no design variable of this case has a cost"
+                        raise invalid(reason, remedy, f"{key}.statistic")
                     goal.priced_by(priced)
 
     @staticmethod
@@ -236,11 +228,9 @@ class Study(StudyTables):
         if self.sensitivity.groups:
             parameter = self.sensitivity.parameter
             if parameter is None:
+                reason = "not one variable drives clearances, so the fixed parameter is not known"
                 raise invalid(
-                    "no study variable, or more than one, drives a clearance, "
-                    "so the fixed parameter of each surface is not known",
-                    f"Name one of {', '.join(self.names)}",
-                    key="sensitivity.parameter",
+                    reason, f"Name one of {', '.join(self.names)}", "sensitivity.parameter"
                 )
             check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):

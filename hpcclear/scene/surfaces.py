@@ -45,17 +45,15 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
         return
     ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths
     if film.law.further is not None and not least <= ratio <= most:
-        raise invalid(
-            f"is for lengths from {least:g} to {most:g} diameters, and this bearing is {ratio:.3g} long",
-            'Take "short"' if ratio < 1.0 else 'Take "long"',
-            "film.model",
+        reason = (
+            f"is for lengths from {least:g} to {most:g} diameters, and this is {ratio:.3g} long"
         )
+        remedy = 'Take "short"' if ratio < 1.0 else 'Take "long"'
+        raise invalid(reason, remedy, "film.model")
     if 4.0 * film.roughness > clearance:
-        raise invalid(
-            f"must be at most a quarter of the clearance ({shown(clearance, 'm')}), or no film is left",
-            "Write the roughness of both surfaces together",
-            "film.roughness",
-        )
+        most_rough = f"a quarter of the clearance ({shown(clearance, 'm')})"
+        reason = f"must be at most {most_rough}, or no film is left"
+        raise invalid(reason, "Write the roughness of both surfaces together", "film.roughness")
 
 
 MOST_WAVES = 8
@@ -116,13 +114,10 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
     for name in ("bearing", "journal"):
         own = getattr(waves, name)
         if own is not None and own.deepest() >= clearance:
-            raise invalid(
-                f"waves are up to {shown(own.deepest(), 'm')} high, "
-                f"but the clearance is {shown(clearance, 'm')}: the journal may not fit",
-                "Make them smaller than the clearance",
-                key=f"out_of_round.{name}",
-                value=own.deepest(),
-            )
+            high, given = shown(own.deepest(), "m"), shown(clearance, "m")
+            reason = f"waves are {high} high, but the clearance is {given}: the journal may not fit"
+            remedy = "Make them smaller than the clearance"
+            raise invalid(reason, remedy, f"out_of_round.{name}", own.deepest())
 
 
 class WornSurface(Table):
@@ -142,11 +137,10 @@ class WornSurface(Table):
             "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
         )  # fmt: skip
         if (self.dimensionless is None) != (self.hardness is None):
-            raise invalid(
-                "a dimensionless coefficient needs a hardness; a coefficient in m2/N must have none",
-                "Give both, or neither",
-                "hardness",
+            reason = (
+                "a dimensionless coefficient needs a hardness; a coefficient in m2/N must have none"
             )
+            raise invalid(reason, "Give both, or neither", "hardness")
 
 
 class RunningIn(Table):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.pieces import mean_of
+from hpcclear.base.pieces import periodic
 from hpcclear.scene.curves import Curve
 from hpcclear.scene.driving import CrankTorque, speed_entry
 from hpcclear.scene.fields import Content
@@ -179,7 +179,7 @@ def _mean(
     """Replace a load that is tabulated over some turns, those of the scene by default, by the mean of the curve that acts."""
     if isinstance(curve, tuple):
         length = 2.0 * np.pi * (turns_of(scene.linkage) if turns is None else turns)
-        mean = mean_of(curve, length, scene.numerics.interpolation)
+        mean = periodic(curve, length, scene.numerics.interpolation).mean()
         yield Switch(f"variation of {name}", {key: mean})
 
 
