@@ -244,13 +244,7 @@ def scaled(value: float, size: Fraction) -> float:
 def written(value: float, unit: str) -> float | str:
     """A number of a unit as an entry of a scene, whose point nobody takes for a sign of thousands."""
     text = repr(value).removesuffix(".0")
-    return (
-        f"{text}0 {unit}"
-        if may_be_thousands(text) and unit
-        else f"{text} {unit}"
-        if unit
-        else value
-    )
+    return f"{text}{'0' * may_be_thousands(text)} {unit}" if unit else value
 
 
 def _digits(text: str) -> tuple[str, str]:
@@ -317,11 +311,8 @@ def mended(text: str) -> str:
         return f"Write a decimal point: {number.replace(',', '.')}{rest}"
     if raised:
         return f"Write powers of ten with an e, as in {number}{rest}"
-    return (
-        between
-        if re.search(r"\d[^\d]+\d.*[^\d]|\d[^\d.]+\d|\.\.", number) or rest[:1].isdigit()
-        else ""
-    )
+    signs = re.search(r"\d[^\d]+\d.*[^\d]|\d[^\d.]+\d|\.\.", number)
+    return between if signs or rest[:1].isdigit() else ""
 
 
 def shows_point(text: object) -> bool:

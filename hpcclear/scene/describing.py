@@ -60,8 +60,7 @@ def _drive(scene: SceneTables) -> Iterator[str]:
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:
         yield (
             f"drive.{key} = {scene.shown(f'drive.{key}')} is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; "
-            "engines "
-            f'stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
+            f'engines stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
         )
 
 
@@ -74,8 +73,7 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
         if (own := bar.own_inertia) > 100.0 * bar.mass * length**2:
             yield (
                 f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {own / (bar.mass * length**2):.2g} times mass times "
-                "length squared; "
-                "check the unit, or give a flywheel as flywheel_inertia of a drive"
+                "length squared; check the unit, or give a flywheel as flywheel_inertia of a drive"
             )
     points = [scene.linkage.ground.points, *(body.points for _, body in bodies)]
     places = [one for own in points for one in own]
@@ -100,9 +98,8 @@ def _rod(scene: SceneTables) -> Iterator[str]:
     buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
     if inertia > 0.5 * buckling:
         yield (
-            f"mechanism.rod.bending.stiffness = {scene.shown('mechanism.rod.bending.stiffness')} "
-            f"buckles under {buckling:.3g} N, "
-            f"and the inertia of rod and slider comes to {inertia:.3g} N; deflections are no longer small there"
+            f"mechanism.rod.bending.stiffness = {scene.shown('mechanism.rod.bending.stiffness')} buckles under "
+            f"{buckling:.3g} N, and the inertia of rod and slider comes to {inertia:.3g} N; deflections are large there"
         )
 
 

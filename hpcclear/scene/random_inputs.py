@@ -79,22 +79,16 @@ def _worn(entries: Content) -> quantiles.Quantiles:
     )  # fmt: skip
 
 
-def _uniform(entries: Content) -> quantiles.Quantiles:
-    return quantiles.Uniform(*_middle_and_reach(entries))
-
-
-def _samples(entries: Content) -> quantiles.Quantiles:
-    return quantiles.Empirical(entries["values"])
-
-
 OURS = {
-    "uniform": Form(_uniform, {"half_width"}, {"mean"}),
+    "uniform": Form(
+        lambda own: quantiles.Uniform(*_middle_and_reach(own)), {"half_width"}, {"mean"}
+    ),
     "normal": Form(_normal, {"deviation"}, {"mean"}),
     "truncated-normal": Form(_normal, {"deviation", "half_width"}, {"mean"}),
     "lognormal": Form(_lognormal, {"mean", "deviation"}, {*OF_LIMITS}),
     "beta": Form(_beta, {"shapes", "half_width"}, {"mean"}),
     "weibull": Form(_weibull, {"scale", "shape"}, {"location", *OF_LIMITS}),
-    "samples": Form(_samples, {"values"}, {"about_design"}),
+    "samples": Form(lambda own: quantiles.Empirical(own["values"]), {"values"}, {"about_design"}),
     "fit": Form(law_of, may_have={"fit", "bore", "pin", "range"}),
     "wear": Form(_worn, {"cycles"}, {"half_width"}),
 }

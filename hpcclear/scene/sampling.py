@@ -239,15 +239,11 @@ def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str
 def sampled(scene: Scene) -> Points:
     """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
     method = scene.required_study.method
-    match method:
-        case "lhs":
-            points = latin_hypercube(scene)
-        case "random-lhs":
-            points = monte_carlo(scene, stratified=True)
-        case "qmc":
-            points = monte_carlo(scene, replicate=0)
-        case _:
-            points = monte_carlo(scene)
+    if method == "lhs":
+        points = latin_hypercube(scene)
+    else:
+        sequence = 0 if method == "qmc" else None
+        points = monte_carlo(scene, replicate=sequence, stratified=method == "random-lhs")
     return replace(points, sampling=method)
 
 

@@ -240,8 +240,6 @@ class Verification(Table):
     @property
     def draws(self) -> int | None:
         """Independent draws of a design; None for randomised Sobol sequences."""
-        return (
-            None
-            if self.method in (None, "qmc") and self.samples is None
-            else self.samples or 10_000
-        )
+        if self.method in (None, "qmc") and self.samples is None:
+            return None
+        return self.samples or 10_000

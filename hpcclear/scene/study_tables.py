@@ -165,12 +165,9 @@ class StudyTables(Table):
     @property
     def optimisation(self) -> Names:
         """Variables of the optimisation: inputs of the model the swarm searches, and those that only random inputs know."""
-        chosen = self.surrogate.optimisation
-        return (
-            tuple(one.name for one in self.variables if one.over is None)
-            if chosen is None
-            else chosen
-        )
+        if self.surrogate.optimisation is not None:
+            return self.surrogate.optimisation
+        return tuple(one.name for one in self.variables if one.over is None)
 
     @property
     def load_cases(self) -> StudyVariable | None:

@@ -97,10 +97,9 @@ def _drives(speeds: Mapping[str, float]) -> Content:
     }  # fmt: skip
     sizes = [round(1e6 * abs(speed)) for speed in speeds.values()]
     turns = min(sizes) // max(math.gcd(*sizes), 1)
-    if 1 < turns <= MOST_TURNS:
-        list(made.values())[sizes.index(min(sizes))] |= {"period": True, "turns": turns}
-    elif len(set(sizes)) > 1:
-        list(made.values())[sizes.index(min(sizes))] |= {"period": True}
+    slowest = list(made.values())[sizes.index(min(sizes))]
+    slowest |= {"period": True} if len(set(sizes)) > 1 else {}
+    slowest |= {"turns": turns} if 1 < turns <= MOST_TURNS else {}
     return made
 
 
