@@ -140,11 +140,6 @@ class Law:
         """Functions that read the same numbers after a run."""
         return []
 
-    def unit(self, name: str) -> str:
-        """Unit of what a function may require; raises KeyError."""
-        own = {one.name: one.unit for one in self.parameters}
-        return {**JOINT, **VARYING[self.kind], **own, **self.numbers}[name]
-
     def parameter(self, name: str) -> Parameter | None:
         """That of a name."""
         return next((one for one in self.parameters if one.name == name), None)

@@ -84,11 +84,6 @@ class PinInBearing(Table):
     out_of_round: OutOfRound | None = None
     """Waviness of its surfaces. Without it they are round."""
 
-    @property
-    def journal_radius(self) -> float:
-        """R_J = R_B - c, m."""
-        return self.bearing_radius - self.clearance
-
     _in_radii = model_validator(mode="before")(with_clearance)
 
     def _check(self) -> None:
