@@ -138,9 +138,7 @@ class Study(StudyTables):
                     remedy = "Add it to study.variables and to study.surrogate.optimisation"
                     raise invalid(reason, remedy, f"cases.{case.name}")
             if not self.design_variables(case.name):
-                reason = (
-                    "every variable of this case has an absolute distribution, so no design is left"
-                )
+                reason = "every distribution of this case is absolute: no design variable is left"
                 remedy = "Add a study variable, or give a half_width instead of a range"
                 raise invalid(reason, remedy, f"cases.{case.name}")
             self._check_goals(case)
