@@ -31,7 +31,9 @@ def with_shares(content: Mapping[str, object]) -> Mapping[str, object]:
         if not isinstance(row, Mapping):
             continue
         variable = _at(content, f"study.variables.{name}")
-        path = next(iter(_paths(name, row, variable)), "")
+        given = row.keys() & {"path", "paths"}
+        own = row if given or not isinstance(variable, Mapping) else variable
+        path = next(iter(paths_of(name, own)), "")
         for key in ("half_width", "deviation"):
             share = row.get(key)
             if not is_share(share) or path not in quantities():
@@ -70,13 +72,6 @@ def note_share(share: str, unit: str, about: str) -> None:
             share,
             f"{share.strip()} of {about}; for a width of that many hundredths write a plain number",
         )
-
-
-def _paths(name: str, row: Mapping[str, object], variable: object) -> tuple[str, ...]:
-    """Entries that a random input drives, those of the study variable of its name if it has no path of its own."""
-    if "path" in row or "paths" in row or not isinstance(variable, Mapping):
-        return paths_of(name, row)
-    return paths_of(name, variable)
 
 
 def _number(content: Mapping[str, object], path: str) -> object:

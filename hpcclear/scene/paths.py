@@ -74,21 +74,17 @@ def of_kinds(content: Mapping[str, object]) -> Iterator[None]:
         _kinds.reset(token)
 
 
-def _kinds_of(model: type[BaseModel]) -> tuple[str, ...]:
-    """What the entry ``kind`` of a table may say."""
-    field = model.model_fields.get("kind")
-    return () if field is None else tuple(map(str, get_args(field.annotation)))
-
-
 def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:
     """Paths and declarations of entries that are no tables, and the kinds of table that have them."""
     for model in _parts(annotation):
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
             continue
+        kind = model.model_fields.get("kind")
+        kinds = () if kind is None else tuple(map(str, get_args(kind.annotation)))
         for name, field in model.model_fields.items():
             path = f"{prefix}.{name}"
             inner = f"{path}.*" if _named(field) else path
-            yield from [*_entries(field.annotation, inner)] or [(path, field, _kinds_of(model))]
+            yield from [*_entries(field.annotation, inner)] or [(path, field, kinds)]
 
 
 def _all_entries() -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:

@@ -7,18 +7,14 @@ import numpy as np
 from hpcclear.base.arrays import Array
 
 
-def _words(text: str) -> tuple[int, ...]:
-    """A text as words of a spawn key."""
-    return tuple(int(word) for word in np.frombuffer(hashlib.sha256(text.encode()).digest(), "<u4"))
-
-
 def generator(seed: int, *labels: str) -> np.random.Generator:
     """A stream of random numbers of its own for each purpose, from the study's seed."""
     return np.random.default_rng(_seed(seed, *labels))
 
 
 def _seed(seed: int, *labels: str) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=sum((_words(label) for label in labels), ()))
+    digests = b"".join(hashlib.sha256(label.encode()).digest() for label in labels)
+    return np.random.SeedSequence(seed, spawn_key=tuple(np.frombuffer(digests, "<u4").tolist()))
 
 
 def uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array:
