@@ -82,13 +82,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """What laws of all kinds declare.
-
-    Raises
-    ------
-    TypeError
-        If a function requires an unknown quantity.
-    """
+    """What laws of all kinds declare. Raises TypeError: a function requires an unknown quantity."""
 
     words: str
     """One sentence: what it is."""

@@ -24,16 +24,9 @@ Plugin = TypeVar("Plugin")
 
 
 class Registry(Generic[Plugin]):
-    """Plug-ins of one kind by their names.
+    """Plug-ins of one `kind`, such as "contact law", by their names; `group`: of the entry points of installed packages.
 
-    Parameters
-    ----------
-    kind : str
-        In messages: "contact law".
-    group : str
-        Of the entry points of installed packages.
-    needs : sequence of str
-        Attributes that every plug-in of this kind has; what lacks one is refused.
+    `needs`: attributes that every plug-in of this kind has; what lacks one is refused.
     """
 
     def __init__(self, kind: str, group: str, needs: tuple[str, ...] = ()) -> None:
@@ -65,15 +58,9 @@ class Registry(Generic[Plugin]):
         return (*self._ours, *sorted(installed - self._ours.keys()))
 
     def get(self, name: str, texts: Mapping[str, str] | None = None) -> Plugin:
-        """What a name stands for.
+        """What a name stands for: one of `names`, or ``"module:Name"``.
 
-        Parameters
-        ----------
-        name : str
-            One of `names`, or ``"module:Name"``.
-        texts : mapping, optional
-            Source texts by module, `Scene.plugin_texts`; while a scene is read, that scene's.
-
+        `texts`: source texts by module, `Scene.plugin_texts`; while a scene is read, that scene's.
         Raises InputError: there is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
         """
         if name in self._ours:

@@ -40,10 +40,7 @@ _trusted: ContextVar[bool] = ContextVar("trusted", default=False)
 def using(texts: Mapping[str, str]) -> Iterator[dict[str, str]]:
     """In this block ``"module:Name"`` is found in these source texts, by module.
 
-    Yields
-    ------
-    dict
-        Versions of the packages whose plug-ins were taken meanwhile, by package.
+    Yields versions of the packages whose plug-ins were taken meanwhile, by package.
     """
     packages: dict[str, str] = {}
     token = _reading.set(_Reading(texts, packages))
@@ -103,14 +100,7 @@ class _Loader(importlib.abc.InspectLoader):
 
 
 def run_source(module: str, text: str) -> ModuleType:
-    """The module of a source text, run at most once in a process.
-
-    Parameters
-    ----------
-    module : str
-        Its name in scenes: ``"mylaws"`` for mylaws.py.
-    text : str
-        Python.
+    """The module of a source text, run at most once in a process; `module`: its name in scenes, ``"mylaws"`` for mylaws.py.
 
     Raises InputError if it cannot be run: what it raised, and in which line.
     """
