@@ -106,10 +106,7 @@ class CrankSpeed(Table):
 
     elsewhere: ClassVar = dict.fromkeys(
         ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
-        (
-            "contradicts a prescribed speed",
-            'Remove it, or set kind = "torque" and give initial_speed instead of speed',
-        ),
+        ("contradicts a prescribed speed", 'Remove it, or set kind = "torque" with initial_speed'),
     )
 
 
@@ -215,10 +212,7 @@ class CrankTorque(Table):
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
     elsewhere: ClassVar = {
-        "speed": (
-            "a drive by a torque has no prescribed speed",
-            'Remove it and give initial_speed, or set kind = "constant-speed"',
-        )
+        "speed": ("is a result of a torque", 'Give initial_speed, or kind = "constant-speed"'),
     }
 
     def _check(self) -> None:

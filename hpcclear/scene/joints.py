@@ -108,16 +108,13 @@ def length_path(joint: "PinInBearing | OfContacts") -> str | None:
 
 NOT_OF_GUIDES = {
     "wear": (
-        "wear is modelled in pins only, not in guides",
-        "Remove it; normal force and sliding speed of each corner are in the response",
+        "wear is modelled in pins only",
+        "Remove it; the response has forces and speeds of corners",
     ),
     "film": ("oil films are modelled in pins only, not in guides", "Remove it"),
     "out_of_round": ("is of pins and bearings, and a guide is straight", "Remove it"),
     "bearing_radius": ("is of pins, and a slider has length, height, corner_radius", "Remove it"),
-    "fit": (
-        "is of pins and bearings",
-        "Write clearance, half of the channel's height less the slider's",
-    ),
+    "fit": ("is of pins and bearings", "Write clearance: half of what the slider is lower"),
 }
 """Entries of other joints that a user might write here."""
 
