@@ -30,9 +30,8 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     if isinstance(points, Points):
         return points
     if not points:
-        raise InputError(
-            "points", {}, "no entry is varied", "Give at least one name and its values"
-        )
+        reason = "no entry is varied"
+        raise InputError("points", {}, reason, "Give at least one name and its values")
     columns = {
         str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
     }

@@ -154,12 +154,10 @@ def _mean(values: Array) -> float:
 def _refuse_zero(scene: Scene, whole: VariantResult) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
-        raise InputError(
-            "study.objective", scene.objective.name, "is zero in every variant",
-            'Choose another one, such as "peak-crank-moment"',
-        )  # fmt: skip
+        reason = "is zero in every variant"
+        remedy = 'Choose another one, such as "peak-crank-moment"'
+        raise InputError("study.objective", scene.objective.name, reason, remedy)
     if not known.size:
-        raise InputError(
-            "effects", len(whole.objective), "every simulation of the complete scene failed",
-            "Run hpcclear simulate to see the reason",
-        )  # fmt: skip
+        reason = "every simulation of the complete scene failed"
+        remedy = "Run hpcclear simulate to see the reason"
+        raise InputError("effects", len(whole.objective), reason, remedy)

@@ -135,10 +135,8 @@ class Trial:
             except InputError as error:
                 self.kept[one.name] = error.reason
         if not self.switches:
-            raise InputError(
-                "effects", None, "the scene has no effect that could be disabled",
-                "Run hpcclear check to see the effects",
-            )  # fmt: skip
+            reason = "the scene has no effect that could be disabled"
+            raise InputError("effects", None, reason, "Run hpcclear check to see the effects")
         self._variants: dict[Variant, Off | None] = {}
         self._bare = scene.with_({"study": None})  # quick to change
         self._implicit: dict[Variant, bool] = {}
@@ -185,9 +183,8 @@ class Trial:
     def plan(self, wanted: Wanted) -> Screening:
         """What is required of the effect screening. Raises InputError: the tolerance is none."""
         if not 0.0 < wanted.tolerance < 1.0:
-            raise InputError(
-                "--tolerance", wanted.tolerance, "is not a relative change above 0 and below 1", "Write 1%, or 0.01"
-            )  # fmt: skip
+            reason = "is not a relative change above 0 and below 1"
+            raise InputError("--tolerance", wanted.tolerance, reason, "Write 1%, or 0.01")
         most = max(wanted.samples // self.drawn.size, 4)
         return Screening(
             len(self.switches), wanted.tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,

@@ -58,15 +58,12 @@ class Linkage:
                 self._take({name: self._free})
         count = sum(joint.kind == "revolute" for joint in mechanism.joints)
         if count > at.MAX_PINS:
-            raise InputError(
-                "mechanism.joints", count, f"more than {at.MAX_PINS} pins without clearance", "Use fewer bodies"
-            )  # fmt: skip
+            reason = f"more than {at.MAX_PINS} pins without clearance"
+            raise InputError("mechanism.joints", count, reason, "Use fewer bodies")
         if self._free > at.WAVES:
-            raise InputError(
-                "mechanism.bodies", len(mechanism.bodies),
-                f"need {self._free - at.OWN} parameters, more than {at.WAVES - at.OWN}",
-                "Use fewer bodies or points",
-            )  # fmt: skip
+            reason = f"need {self._free - at.OWN} parameters, more than {at.WAVES - at.OWN}"
+            remedy = "Use fewer bodies or points"
+            raise InputError("mechanism.bodies", len(mechanism.bodies), reason, remedy)
 
     def _text(self, on: On) -> Motion:
         """A text, in the rows that those before it have taken."""
@@ -118,10 +115,8 @@ class Linkage:
         ]
         count = len(tabled) + len(self.straight)
         if count > at.MAX_CURVES:
-            raise InputError(
-                "mechanism.loads", count, f"more than {at.MAX_CURVES} tabulated curves",
-                "Give some of them as constants",
-            )  # fmt: skip
+            reason = f"more than {at.MAX_CURVES} tabulated curves"
+            raise InputError("mechanism.loads", count, reason, "Give some of them as constants")
         return {name: at.CURVES + k for k, name in enumerate(tabled)}
 
     @cached_property

@@ -140,14 +140,12 @@ def _records(m: Mechanism) -> Iterator[tuple[str, Any]]:
 def _names(m: Mechanism) -> None:
     for key, one in _records(m):
         if not _NAME.fullmatch(one.name) or one.name == GROUND:
-            raise InputError(
-                key, one.name, "is not a valid name", "Use letters, digits and _, and not 'ground'"
-            )
+            reason = "is not a valid name"
+            raise InputError(key, one.name, reason, "Use letters, digits and _, and not 'ground'")
         if "center" in getattr(one, "points", ()):
-            raise InputError(
-                f"{key}.points.center", one.points["center"], "is reserved for the mass centre",
-                "Give the point another name",
-            )  # fmt: skip
+            reason = "is reserved for the mass centre"
+            remedy = "Give the point another name"
+            raise InputError(f"{key}.points.center", one.points["center"], reason, remedy)
     if not m.bodies:
         raise InputError("bodies", None, "there is no body", "Add [bodies.NAME] with its mass")
 
@@ -224,16 +222,13 @@ def _turned(m: Mechanism) -> None:
         body, other = (getattr(load, entry, None) for entry in ("body", "other"))
         for entry in ("body", "other", "angle_of"):
             if (name := getattr(load, entry, None)) in still:
-                raise InputError(
-                    f"loads.{load.name}.{entry}", name, "this body cannot rotate",
-                    "Name a body that does",
-                )  # fmt: skip
+                reason = "this body cannot rotate"
+                remedy = "Name a body that does"
+                raise InputError(f"loads.{load.name}.{entry}", name, reason, remedy)
         if load.by_angle and other is None and gains[str(body)] - {0.0}:
-            raise InputError(
-                f"loads.{load.name}.body", body,
-                "this body goes round with every revolution, so that its angle has no end",
-                "Name a body that swings, or another one with `other` that goes round with it",
-            )  # fmt: skip
+            reason = "this body goes round with every revolution, so that its angle has no end"
+            remedy = "Name a body that swings, or another one with `other` that goes round with it"
+            raise InputError(f"loads.{load.name}.body", body, reason, remedy)
         if load.by_angle and other is not None and len(gains[str(body)]) > 1:
             raise InputError(
                 f"loads.{load.name}.other", other,
@@ -307,10 +302,9 @@ def _connected(m: Mechanism) -> None:
         name = next(body.name for body in m.bodies if body.name in rest[0])
         others = sorted(rest[0] - {name})
         alone = f" (nor are {', '.join(others)})" if others else ""
-        raise InputError(
-            f"bodies.{name}", name, f"no joints lead from it to the ground{alone}",
-            f"Add a joint to {' or '.join(sorted(first)[:4])}",
-        )  # fmt: skip
+        reason = f"no joints lead from it to the ground{alone}"
+        remedy = f"Add a joint to {' or '.join(sorted(first)[:4])}"
+        raise InputError(f"bodies.{name}", name, reason, remedy)
 
 
 def _drives(m: Mechanism) -> None:
@@ -324,15 +318,12 @@ def _drives(m: Mechanism) -> None:
     for drive in m.drives:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
         if GROUND in groups[group] and drive.kind != "free":
-            raise InputError(
-                f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
-                "Drive a body on a revolute joint",
-            )  # fmt: skip
+            reason = "this body cannot rotate, since it is on a prismatic joint"
+            remedy = "Drive a body on a revolute joint"
+            raise InputError(f"drives.{drive.name}.body", drive.body, reason, remedy)
         if group in driven:
-            raise InputError(
-                f"drives.{drive.name}.body", drive.body,
-                f"its angle is driven by {driven[group]!r} already", "Remove one of them",
-            )  # fmt: skip
+            reason = f"its angle is driven by {driven[group]!r} already"
+            raise InputError(f"drives.{drive.name}.body", drive.body, reason, "Remove one of them")
         driven[group] = drive.name
     _one_period(m)
 
@@ -341,26 +332,22 @@ def _one_period(m: Mechanism) -> None:
     """One drive's turn is the revolution; what the others prescribe has to repeat within it."""
     named = [drive for drive in m.drives if drive.period]
     if len(named) > 1:
-        raise InputError(
-            f"drives.{named[1].name}.period", True, f"{named[0].name!r} defines the period already",
-            "Leave period = true with one drive",
-        )  # fmt: skip
+        reason = f"{named[0].name!r} defines the period already"
+        remedy = "Leave period = true with one drive"
+        raise InputError(f"drives.{named[1].name}.period", True, reason, remedy)
     main = m.period
     for drive in m.drives:
         if drive is not main and drive.kind == "table" and drive.advance:
-            raise InputError(
-                f"drives.{drive.name}.angle", drive.advance, "goes round by full turns, but another drive defines the period",
-                "End it at the angle where it began, or set period = true here",
-            )  # fmt: skip
+            reason = "goes round by full turns, but another drive defines the period"
+            remedy = "End it at the angle where it began, or set period = true here"
+            raise InputError(f"drives.{drive.name}.angle", drive.advance, reason, remedy)
         if drive is main or not (drive.prescribed and main.prescribed):
             continue
         times = main.seconds / drive.seconds
         if abs(times - round(times)) > 1e-9 * times or round(times) < 1:
-            raise InputError(
-                f"drives.{drive.name}", drive.seconds,
-                f"does not repeat within the period of {main.name!r} ({main.seconds:g} s)",
-                "Make the longest one the period, and the others whole fractions of it",
-            )  # fmt: skip
+            reason = f"does not repeat within the period of {main.name!r} ({main.seconds:g} s)"
+            remedy = "Make the longest one the period, and the others whole fractions of it"
+            raise InputError(f"drives.{drive.name}", drive.seconds, reason, remedy)
 
 
 def freedom(m: Mechanism) -> int:
@@ -380,7 +367,5 @@ def _sizes(m: Mechanism) -> None:
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip
     if len(m.contacts) > MAX_JOINTS:
-        raise InputError(
-            "joints", len(m.contacts), f"more than {MAX_JOINTS} contacts in joints (four in a guide, two in a slot)",
-            "Make some of the joints ideal",
-        )  # fmt: skip
+        reason = f"more than {MAX_JOINTS} contacts in joints (four in a guide, two in a slot)"
+        raise InputError("joints", len(m.contacts), reason, "Make some of the joints ideal")

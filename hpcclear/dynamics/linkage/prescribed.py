@@ -73,10 +73,9 @@ def prescribed_motion(
     centre.
     """
     if mechanism.clearances or freedom(mechanism):
-        raise InputError(
-            "drives", freedom(mechanism), "the motion is not prescribed: degrees of freedom are left free",
-            "Prescribe one angle for each degree of freedom, and make all joints ideal",
-        )  # fmt: skip
+        reason = "the motion is not prescribed: degrees of freedom are left free"
+        remedy = "Prescribe one angle for each degree of freedom, and make all joints ideal"
+        raise InputError("drives", freedom(mechanism), reason, remedy)
     assembly, times = assemble(mechanism), np.asarray(times, float)
     return _motion(assembly, _passed(assembly, times, gravity), times, gravity, curves or {})
 

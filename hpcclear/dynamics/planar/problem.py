@@ -70,16 +70,14 @@ def _check_followed(scene: Scene, follow: str) -> None:
             'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
     if "acceleration_x" in asks and not follow:
-        raise InputError(
-            scene.objective_key, name, "no body or point is followed, so there is no acceleration",
-            'Name a point: mechanism.followed = "body.point"',
-        )  # fmt: skip
+        reason = "no body or point is followed, so there is no acceleration"
+        remedy = 'Name a point: mechanism.followed = "body.point"'
+        raise InputError(scene.objective_key, name, reason, remedy)
     of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}
     if asks & of_points and not point:
-        raise InputError(
-            scene.objective_key, name, "no point is followed",
-            'Name it: mechanism.followed = "body.point"',
-        )  # fmt: skip
+        reason = "no point is followed"
+        remedy = 'Name it: mechanism.followed = "body.point"'
+        raise InputError(scene.objective_key, name, reason, remedy)
 
 
 def _check_room(scene: Scene, others: int) -> None:
@@ -89,15 +87,13 @@ def _check_room(scene: Scene, others: int) -> None:
         return
     most = f"{count} coordinates, of {at.MAX_COORDINATES} at most"
     if others <= at.MAX_COORDINATES:
-        raise InputError(
-            "effects.friction.law", scene.effects.friction.law, f"needs one for each joint with clearance: {most}",
-            'Write law = "coulomb", or make some of the joints ideal',
-        )  # fmt: skip
+        reason = f"needs one for each joint with clearance: {most}"
+        remedy = 'Write law = "coulomb", or make some of the joints ideal'
+        raise InputError("effects.friction.law", scene.effects.friction.law, reason, remedy)
     if scene.numerics.formulation == "baumgarte":
-        raise InputError(
-            "numerics.formulation", "baumgarte", f"has three for each body: {most}",
-            'Write formulation = "minimal", or use fewer bodies',
-        )  # fmt: skip
+        reason = f"has three for each body: {most}"
+        remedy = 'Write formulation = "minimal", or use fewer bodies'
+        raise InputError("numerics.formulation", "baumgarte", reason, remedy)
     bodies = len(scene.linkage.bodies)
     raise InputError(
         "mechanism.bodies", bodies, f"have {most}", "Use fewer bodies, joints with clearance or modes of bending"
@@ -178,10 +174,9 @@ def check_columns(scene: Scene, points: Points | None) -> None:
             if ".out_of_round." in path:
                 continue  # zeros of a round surface may be varied
             if path not in known and _in_tables(scene, path) and scene.number(path) == 0.0:
-                raise InputError(
-                    name, 0.0, f"drives {path}, which is zero in this scene and cannot be varied",
-                    "Give it a small value in the scene, or make it a variable of the study",
-                )  # fmt: skip
+                reason = f"drives {path}, which is zero in this scene and cannot be varied"
+                remedy = "Give it a small value in the scene, or make it a variable of the study"
+                raise InputError(name, 0.0, reason, remedy)
 
 
 def parameters_of(scene: Scene, get: Numbers, points: Points | None) -> Array:

@@ -113,11 +113,9 @@ def _curves_of_rows(scene: Scene, linkage: Linkage) -> tuple[Pieces, ...]:
 def check_objective(scene: Scene) -> None:
     """InputError where the objective has a rate of the whole mechanism, and no motion is integrated that it could go with."""
     if scene.objective.whole and not coordinate_count(scene):
-        raise InputError(
-            scene.objective_key, scene.objective.name,
-            "its rate is integrated along with the motion, and this motion is prescribed",
-            'Give a joint kind = "clearance"',
-        )  # fmt: skip
+        reason = "its rate is integrated along with the motion, and this motion is prescribed"
+        remedy = 'Give a joint kind = "clearance"'
+        raise InputError(scene.objective_key, scene.objective.name, reason, remedy)
 
 
 @lru_cache(maxsize=16)

@@ -189,9 +189,8 @@ def made(source: object, label: str, seed: int) -> Any:
         model = copy.deepcopy(source)
     missing = [name for name in ("fit", "predict") if not callable(getattr(model, name, None))]
     if missing:
-        raise InputError(
-            KEY, label, f"has no {' and no '.join(missing)}", "Give it fit(X, y) and predict(X)"
-        )
+        reason = f"has no {' and no '.join(missing)}"
+        raise InputError(KEY, label, reason, "Give it fit(X, y) and predict(X)")
     if hasattr(model, "get_params") and hasattr(model, "set_params"):
         free = [
             name

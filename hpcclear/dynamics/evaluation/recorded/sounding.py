@@ -148,16 +148,12 @@ def _instants_of_bands(scene: Scene) -> int:
     step = 10.0**0.05  # from the middle of a band to its ends
     for band in bands:
         if np.floor(band * step * period) < max(np.ceil(band / step * period), 1.0):
-            raise InputError(
-                "numerics.levels", band, f"contains no multiple of the frequency of the drive, {1.0 / period:.4g} Hz",
-                "Name a higher band",
-            )  # fmt: skip
+            reason = f"contains no multiple of the frequency of the drive, {1.0 / period:.4g} Hz"
+            raise InputError("numerics.levels", band, reason, "Name a higher band")
     needed = int(np.ceil(spectra.BANDWIDTH * (bands.max(initial=0.0) * step * period + 2.0)))
     if needed > LARGEST_COUNT:
-        raise InputError(
-            "numerics.levels", bands.max(), f"takes {needed} instants a revolution, and there are {LARGEST_COUNT} at most",
-            "Name a lower band",
-        )  # fmt: skip
+        reason = f"takes {needed} instants a revolution, and there are {LARGEST_COUNT} at most"
+        raise InputError("numerics.levels", bands.max(), reason, "Name a lower band")
     return max(needed, scene.output.instants_per_revolution, LEAST)
 
 
