@@ -77,10 +77,10 @@ class Drawn:
         count = last - first
         if self._scene.study is None:
             return self._vicinity(first, count)
+        each, purpose = 1 if self.scattered else self.size, "designs of effects"
         designs = monte_carlo(
-            self._scene, count * (1 if self.scattered else self.size), random=(),
-            purpose="designs of effects", replicate=0, first=first * (1 if self.scattered else self.size),
-        )  # fmt: skip
+            self._scene, count * each, random=(), purpose=purpose, replicate=0, first=first * each
+        )
         if not self.scattered:
             return designs
         parts = [

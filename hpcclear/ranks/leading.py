@@ -49,7 +49,7 @@ def run_points(
     lead.kept = Kept(len(points), earlier) if keep else None
     progress.start(len(points), earlier)
     with contextlib.closing(progress), ranks.timed(task.name) as spent:
-        if not lead.book.done:
+        if not book.done:
             lead.work(task, spent)
             ranks.forget_queue()
     return earlier[:0] if lead.kept is None else lead.kept.records()

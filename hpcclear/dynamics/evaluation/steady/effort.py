@@ -133,7 +133,5 @@ class Effort:
     def failure(self, outcome: Outcome, rtol: float) -> Mean:
         """Some copy did not reach its end."""
         assert self.failed is not None
-        return self.mean(
-            regime=Regime.UNJUDGED, limit=np.nan, outcomes=outcome[None], segment=1, rtol=rtol, met=False,
-            status=self.failed,
-        )  # fmt: skip
+        unknown = {"regime": Regime.UNJUDGED, "limit": np.nan, "met": False, "status": self.failed}
+        return self.mean(**unknown, outcomes=outcome[None], segment=1, rtol=rtol)

@@ -62,13 +62,7 @@ class Tableau:
 
 
 def _pair(
-    name: str,
-    order: int,
-    error_order: int,
-    rows: list[list[F]],
-    b: list[F],
-    other: list[F],
-    source: str,
+    name: str, orders: tuple[int, int], rows: list[list[F]], b: list[F], other: list[F], source: str
 ) -> Tableau:
     """Assemble a tableau from exact fractions, adding the new point as last stage where it is missing."""
     n = len(b)
@@ -76,12 +70,9 @@ def _pair(
     if matrix[-1] != b:
         matrix = [[*row, F(0)] for row in matrix] + [[*b, F(0)]]
         b, other = [*b, F(0)], [*other, F(0)]
-    as_float = lambda row: [float(x) for x in row]  # noqa: E731
-    a = np.array([as_float(row) for row in matrix])
     error = [x - y for x, y in zip(b, other, strict=True)]
-    return Tableau(
-        name, order, error_order, a, np.array(as_float(b)), np.array(as_float(error)), source
-    )
+    a, weights, error_weights = (np.array(one, dtype=float) for one in (matrix, b, error))
+    return Tableau(name, *orders, a, weights, error_weights, source)
 
 
 def _numbers(*rows: list[str]) -> list[list[F]]:
@@ -91,8 +82,7 @@ def _numbers(*rows: list[str]) -> list[list[F]]:
 
 DORMAND_PRINCE = _pair(
     "dormand-prince",
-    5,
-    4,
+    (5, 4),
     [
         [],
         [F(1, 5)],
@@ -120,8 +110,7 @@ _TSITOURAS_ERROR = [
 ]  # fmt: skip
 TSITOURAS = _pair(
     "tsitouras",
-    5,
-    4,
+    (5, 4),
     _numbers(
         [],
         ["0.161"],
@@ -148,8 +137,7 @@ TSITOURAS = _pair(
 
 FEHLBERG = _pair(
     "fehlberg",
-    4,
-    5,
+    (4, 5),
     [
         [],
         [F(1, 4)],
@@ -166,8 +154,7 @@ FEHLBERG = _pair(
 # Ratios of whole numbers, with which the order conditions hold to 1e-15.
 PRINCE_DORMAND = _pair(
     "prince-dormand",
-    8,
-    7,
+    (8, 7),
     _numbers(
         [],
         ["1/18"],
