@@ -1,10 +1,10 @@
 """How long the answers of all commands are: lines and columns that each prints, beside those of another version.
 
-    python analysis/terminal.py [--before PROGRAM] [--keep DIRECTORY]
+    python analysis/terminal.py [--before COMMIT] [--keep DIRECTORY]
 
-PROGRAM is the Python of an environment with the other version; DIRECTORY gets what the commands of this one print. Runs short
-jobs, prints a row a command, and writes ``analysis/results/terminal.csv``. What is left on a terminal counts, notes as well; a
-line of progress is replaced by what follows. Help is left out.
+DIRECTORY gets what the commands print, of both versions. Runs short jobs, ten minutes a version, prints a row a command, and
+writes ``analysis/results/terminal.csv``. What is left on a terminal counts, notes as well; a line of progress is replaced by
+what follows. Help is left out.
 """
 
 import argparse
@@ -19,8 +19,8 @@ import termios
 from pathlib import Path
 
 from recorded import record
+from same_bytes import ROOT, sources
 
-ROOT = Path(__file__).resolve().parent.parent
 LINES, COLUMNS = 24, 80
 SHORT = (
     "--set numerics.transient_revolutions=2 --set numerics.averaged_revolutions=2 "
@@ -58,11 +58,14 @@ COMMANDS = (
 """Commands in the order in which later ones need files of earlier ones."""
 
 
-def left(words: list[str], place: str) -> tuple[int, str]:
-    """Exit code of a command, and what it leaves on a terminal."""
+def left(words: list[str], place: str, root: Path = ROOT) -> tuple[int, str]:
+    """Exit code of a command of the package below `root`, and what it leaves on a terminal."""
     screen, line = pty.openpty()
     termios.tcsetwinsize(line, (LINES, COLUMNS))
-    job = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=line, stderr=line, cwd=place)
+    job = subprocess.Popen(
+        words, stdin=subprocess.DEVNULL, stdout=line, stderr=line, cwd=place,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )  # fmt: skip
     os.close(line)
     seen = b""
     try:
@@ -92,13 +95,13 @@ def shown(written: str) -> str:
     return "\n".join(rows).rstrip()
 
 
-def answers(program: str, keep: Path | None = None) -> dict[str, tuple[int, int]]:
-    """What each command prints, by the command; nothing of one that failed."""
+def answers(root: Path, keep: Path | None = None) -> dict[str, tuple[int, int]]:
+    """Lines and columns that each command prints, by the command; nothing of one that failed."""
     found = {}
     with tempfile.TemporaryDirectory() as place:
         for command in COMMANDS:
             words = shlex.split(command.replace("JOBS", str(ROOT / "jobs")))
-            code, text = left([program, "-m", "hpcclear", *words], place)
+            code, text = left([sys.executable, "-m", "hpcclear", *words], place, root)
             if code not in (0, 4):
                 print(f"{command}: exit code {code}\n{text}", file=sys.stderr)
                 continue
@@ -114,11 +117,15 @@ def answers(program: str, keep: Path | None = None) -> dict[str, tuple[int, int]
 def main() -> None:
     """Measure, compare, record."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--before", metavar="PROGRAM")
+    parser.add_argument("--before", metavar="COMMIT")
     parser.add_argument("--keep", type=Path, metavar="DIRECTORY")
     options = parser.parse_args()
-    now = answers(sys.executable, options.keep)
-    then = answers(options.before) if options.before else {}
+    keep, then = options.keep, {}
+    if options.before:
+        with tempfile.TemporaryDirectory() as place:
+            before = sources(options.before, Path(place) / "before")
+            then = answers(before, keep and keep / "before")
+    now = answers(ROOT, keep)
     rows = [
         (
             command.split(" --set")[0].replace("JOBS", "jobs"),

@@ -64,7 +64,7 @@ def _describe(
         for text in troubles:
             out.print(text)
     elif first is not None and files:
-        files[-1] += "    (--details prints all)"
+        files[-1] += ("    " if len(files[-1]) < 55 else "\n") + "(--details prints all)"
     for place in files:
         out.print(place, soft_wrap=True)
 
