@@ -95,12 +95,6 @@ def outside(result: Results) -> str:
     return f"indentation {100.0 * share:.0f} % of the clearance, Hertz' limit is 25 %"
 
 
-def named(joint: str) -> str:
-    """Return a joint as tables name it: "crank_rod (O12)"."""
-    short = motion.JOINT_NAMES.get(joint)
-    return f"{joint} ({short})" if short else joint
-
-
 def torque(response: Results) -> Torque:
     """Return the torque of the drive; NaN if no averaged revolution is stored."""
     inside = averaged(response)
@@ -176,8 +170,9 @@ def share(contact: float) -> str:
     if not np.isfinite(contact):
         return "–"
     if contact in (0.0, 1.0):
-        return f"{contact:.0%}"
-    return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"
+        return f"{100 * contact:.0f} %"
+    shown = f"{100 * contact:.1f} %"
+    return "> 99.9 %" if contact > 0.999 else "< 0.1 %" if contact < 0.001 else shown
 
 
 def pressures(found: Sequence[Bearing]) -> list[tuple[str, Callable[[Bearing], str]]]:

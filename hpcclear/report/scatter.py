@@ -94,7 +94,7 @@ def _first(
     if not np.isfinite(fall):
         return listed  # a file of an earlier version lacks it
     text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
-    text += f"{fall:.0%} ± {_upwards(HALF_WIDTH * error, 0.01):.0%}"
+    text += f"{100 * fall:.0f} % ± {100 * _upwards(HALF_WIDTH * error, 0.01):.0f} %"
     return text + (", most for its cost" if known else "")
 
 

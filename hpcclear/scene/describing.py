@@ -158,9 +158,6 @@ def cited_by(scene: SceneTables) -> str:
     return TITLE if len(numbers) == len(expected) > len(_LENGTHS) and all(same) else ""
 
 
-NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
-
-
 def effects_on(scene: SceneTables) -> Iterator[str]:
     """What is on, in words."""
     for name in scene.clearance_joints():
@@ -168,7 +165,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         joint = scene.clearance_joint(name)
         kind = {"slide": "guide", "slot": "slot"}.get(joint.kind, "joint")
         where = "the guide" if kind == name == "guide" else f"{kind} {name}"
-        yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
+        yield f"clearance {size} in {where}"
         if joint.out_of_round is not None:
             yield f"joint {name} out of round"
     for name in scene.worn_joints():

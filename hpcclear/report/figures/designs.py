@@ -110,7 +110,9 @@ def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
         row = one.sel(run=run)
         points = [goal.scale(row[goal.searched]) for goal in (x, y)]
         panel.plot(
-            *points, label=f"run {run}", **{**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0}
+            *points,
+            label=f"predicted, run {run}",
+            **{**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0},
         )
 
 

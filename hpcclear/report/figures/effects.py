@@ -168,6 +168,7 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
         height=0.6, xerr=np.abs(ends - length), error_kw={"lw": 0.9},
     )  # fmt: skip
     panel.set(xscale="log", xlim=(floor, None))
+    panel.xaxis.set_minor_formatter("")
     tolerance = 100 * float(effects.attrs["tolerance"])
     panel.axvline(tolerance, color=style.colour("orange"), ls="--", lw=0.9)
     panel.set_yticks(places, [_wrapped(named(effects, k), k == chosen) for k in rows])

@@ -65,13 +65,8 @@ def features_figure(identify: Results) -> "style.Figure":
     score = (measured - predicted) / last["predicted_deviation"].to_numpy()
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
-    look = {
-        "color": style.colour("sky"),
-        "alpha": 0.3,
-        "lw": 0,
-        "label": "two standard deviations",
-    }
-    panel.axhspan(-2.0, 2.0, **look)
+    words = "two standard deviations"
+    panel.axhspan(-2.0, 2.0, color=style.colour("sky"), alpha=0.3, lw=0, label=words)
     panel.plot(np.arange(len(score)), score, "o", color=style.colour("blue"))
     worst = int(last["worst_feature"])
     name = str(last["feature"].to_numpy()[worst])

@@ -45,7 +45,7 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
     attractors = cells["attractors"].to_numpy().T if "attractors" in cells else np.zeros(1)
     most = int(np.nanmax(np.nan_to_num(attractors)))
     count = 3 + (most > 1)
-    figure, axes = style.grid(count, 1, 10.0 + 55.0 * count, sharex=True)
+    figure, axes = style.side_by_side(count, 10.0 / count + 55.0, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
     exponent = cells["lyapunov_exponent"].to_numpy().T
     finite = np.abs(exponent[np.isfinite(exponent)])
@@ -74,7 +74,7 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
         for axis, name in zip((panel.xaxis, panel.yaxis), names, strict=True):
             if rows := labels.options(cells[name]):
                 axis.set_ticks(range(len(rows)), labels=rows)
-    axes[-1, 0].set_xlabel(across)
+    style.below(axes, across)
     return figure
 
 

@@ -8,9 +8,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.results.content import Results, Variable
 
-JOINT_NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
-"""Of the slider-crank's joints; those of a linkage have the names their users gave them."""
-
 TURN = 2.0 * np.pi
 
 
@@ -94,9 +91,8 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
 
 
 def joints(response: Results) -> dict[str, str]:
-    """What the joints of a response are called in figures, by label: O12 and O23 of a slider-crank."""
-    labels = [str(label) for label in response["joint"].to_numpy()]
-    return {label: JOINT_NAMES.get(label, label) for label in labels}
+    """Names of the joints of a response, by label."""
+    return {str(label): str(label) for label in response["joint"].to_numpy()}
 
 
 def pins(response: Results) -> list[str]:

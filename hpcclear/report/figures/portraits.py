@@ -17,7 +17,7 @@ def orbit_figure(response: Results) -> "style.Figure":
     revolutions of a response (kind ``response``)."""
     shown = motion.of_pins(motion.steady(response))
     joints = motion.joints(shown)
-    figure, axes = style.grid(len(joints), 1, style.across() * len(joints))
+    figure, axes = style.side_by_side(len(joints), min(style.across(), style.WIDTH))
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = unit(motion.clearances(shown))
     for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):

@@ -127,10 +127,9 @@ def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:
     known = set(before.numeric_paths())
     for path in known.intersection(scene.numeric_paths()):
         row = _ROW.fullmatch(scene.path_in_linkage(path))
-        pair, unit = (before.number(path), scene.number(path)), scene.unit(path)
-        if row and not np.isclose(*pair, rtol=1e-9, atol=0.0):
-            said = " → ".join(labels.quantities(pair, unit))
-            found.setdefault(row[1], []).append(f"{re.sub('[_.]', ' ', row[2])} {said}")
+        pair = labels.quantities((before.number(path), scene.number(path)), scene.unit(path))
+        if row and pair[0] != pair[1]:
+            found.setdefault(row[1], []).append(f"{re.sub('[_.]', ' ', row[2])} {' → '.join(pair)}")
     return {name: sorted(said) for name, said in sorted(found.items())}
 
 

@@ -64,6 +64,7 @@ class _Columns:
     panels: "Panels" = field(default_factory=dict)
 
 
+column: ContextVar[float] = ContextVar("width of a figure whose user wants none, mm", default=WIDTH)
 _columns: ContextVar[_Columns | None] = ContextVar("results beside each other", default=None)
 
 
@@ -84,7 +85,8 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
         user = wanted.get()
         token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
         default = matplotlib().rcParamsDefault
-        rc = {**default, **RC, **user.rc, "text.usetex": False, "backend": "agg"}
+        usual = {"figure.figsize": (column.get() * MM, 60.0 * MM)}
+        rc = {**default, **RC, **usual, **user.rc, "text.usetex": False, "backend": "agg"}
         try:
             with matplotlib().rc_context(rc), labels.called() as paths:
                 every = several(values.get("response"))
@@ -210,6 +212,24 @@ def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figur
     axes = np.empty(rows * columns, dtype=object)
     axes[:] = list(panels.values())
     return figure, axes.reshape(rows, columns)
+
+
+def side_by_side(count: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
+    """`grid` of one column, axes of shape (count, 1); its panels, each so high, stand beside each other on a wide page."""
+    wide = count > 1 and across() > 1.5 * WIDTH and _given.get() is None
+    columns = 1 + wide
+    rows = -(-count // columns)
+    figure, axes = grid(rows, columns, height * rows, **options if columns == 1 else {})
+    for spare in axes.ravel()[count:]:
+        spare.remove()
+    return figure, axes.ravel()[:count, None]
+
+
+def below(axes: np.ndarray, words: str) -> None:
+    """Label the lowest panel of each column."""
+    specs = [(panel, panel.get_subplotspec()) for panel in axes.ravel()]
+    for panel in {one and one.colspan.start: panel for panel, one in specs}.values():
+        panel.set_xlabel(words)
 
 
 def _panels(

@@ -1,14 +1,16 @@
 """The figures of the page, each with its caption and the subject that it belongs to."""
 
 import base64
+import contextvars
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import catalogue, designs, labels, motion, response, sketch, style
+from hpcclear.report.figures.theme import WIDTH
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.merit import recommended
@@ -35,6 +37,9 @@ SUBJECTS = {
 MECHANISM = "mechanism"
 """Figure that stands above the moving mechanism."""
 
+WIDE = ("accuracy", "bifurcation", "effects", "front", "map", "orbit", "samples")
+"""Figures of several panels that take the width of the page where they stand on the first screen."""
+
 OF_RESPONSE = ("orbit", "noise")
 """Figures of a response that the page has; `hpcclear plot` draws the others."""
 
@@ -45,17 +50,24 @@ MOST_DRAWN = 4
 
 
 def figures(
-    content: Content, troubles: list[str], first: Sequence[str] = (), most: int | None = None
+    content: Content,
+    troubles: list[str],
+    first: Sequence[str] = (),
+    most: int | None = None,
+    wide: Collection[str] = (),
 ) -> list[dict[str, str]]:
-    """Figures, those named `first` before the others, at most so many: name, subject, picture (PNG, base64) and caption; in
-    `troubles`, why one was left out."""
+    """Figures, those named `first` before the others, at most so many, for the width of the page where named `wide`: name,
+    subject, picture (PNG, base64) and caption; in `troubles`, why one was left out."""
     made: list[dict[str, str]] = []
     for name, kind, caption, draw in sorted(
         _drawings(content), key=lambda one: one[0] not in first
     ):
         if len(made) == most:
             break
-        drawn = attempt(f"The figure “{caption}”", functools.partial(_png, draw), troubles)
+        here = contextvars.copy_context()
+        here.run(style.column.set, WIDTH * (2.1 if name in wide else 1.0))
+        make = functools.partial(here.run, _png, draw)
+        drawn = attempt(f"The figure “{caption}”", make, troubles)
         if drawn:
             subject = SUBJECTS.get(kind, "sensitivities")
             made.append({"name": name, "subject": subject, "png": drawn, "caption": caption})
@@ -94,21 +106,15 @@ def _of_responses(
         design, before = before or next(iter(found.values())), None
     caption = "The mechanism to scale, with its dimensions."
     if before is not None:
-        caption = (
-            "Recommended design: parts that differ from the baseline in orange, its outline dashed."
-        )
+        caption = "Recommended design: changed parts in orange, the baseline's outline dashed."
     draw = functools.partial(sketch.mechanism_figure, design, before)
     yield MECHANISM, "response", caption, draw
     name = "original" if "original" in found else next(iter(found))
     of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
     if len(found) == 1:
         caption = f"Response over two revolutions{_clearances(found[name])}."
-        yield (
-            "response",
-            "response",
-            caption,
-            functools.partial(response.response_figure, found[name]),
-        )
+        draw = functools.partial(response.response_figure, found[name])
+        yield "response", "response", caption, draw
     for one in catalogue.of_response(found[name]):
         if one.name in OF_RESPONSE:
             about = of + one.captioned({"response": found[name]})

@@ -89,7 +89,7 @@ def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: 
 
 def _row(name: str, one: bearings.Bearing) -> list[object]:
     return [
-        name, bearings.named(one.joint), quantity(one.peak, "N"), Number(bearings.degrees(one)),
+        name, one.joint, quantity(one.peak, "N"), Number(bearings.degrees(one)),
         quantity(one.mean, "N"), Number(bearings.share(one.contact)), quantity(one.gap, "m"),
     ]  # fmt: skip
 

@@ -133,8 +133,7 @@
     const far = (p) => p.kind === "printed" || p.kind === "original";
     const known = (p) => Number.isFinite(p.x) && Number.isFinite(p.y);
     const shown = () => content.front.points.filter((p) => known(p) && (view.value === "all" || !far(p)));
-    const redraw = () => build(place, shown());
-    legend(byId("front-legend"));
+    const redraw = () => { build(place, shown()); legend(byId("front-legend"), new Set(shown().map((p) => p.kind))); };
     view.addEventListener("change", redraw);
     if (!shown().length) view.value = "all";
     directions(view.closest(".controls"), redraw);
@@ -232,7 +231,8 @@
     choose(Math.max(0, first));
   }
 
-  function legend(place) {
+  function legend(place, kinds) {
+    place.replaceChildren();
     const entry = (point, words) => {
       const item = put(place, "span");
       const svg = draw(item, "svg", { viewBox: "0 0 24 24", "aria-hidden": "true" });
@@ -241,7 +241,7 @@
     };
     for (const name of content.front.cases) if (name) entry({ kind: "design", case: name }, name);
     for (const [kind, words] of Object.entries(content.front.legend)) {
-      if (kind !== "design" || !content.front.cases[0]) entry({ kind, case: content.front.cases[0] }, words);
+      if (kinds.has(kind) && (kind !== "design" || !content.front.cases[0])) entry({ kind, case: content.front.cases[0] }, words);
     }
   }
 

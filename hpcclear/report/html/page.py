@@ -88,7 +88,8 @@ def _page(content: Content) -> str:
     shown = attempt("What the page's script draws", partial(_picture, content), troubles)
     opened = attempt("The first screen", partial(screen_of, content), troubles)
     first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
-    drawn = gallery.figures(content, troubles)
+    wide = {*first.figures} & {*gallery.WIDE}
+    drawn = gallery.figures(content, troubles, wide=wide)
     still = next((one for one in drawn if one["name"] == gallery.MECHANISM), None)
     points = bool(shown and shown["front"]["points"])
     beside = [name for name in first.figures if name != "front" or not points]
@@ -111,6 +112,7 @@ def _page(content: Content) -> str:
         points=points,
         anchors=[one.name for one in subjects],
         beside=[one for one in drawn if one["name"] in first.figures],
+        wide=wide,
         subjects=subjects,
     )
 

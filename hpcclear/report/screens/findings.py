@@ -31,11 +31,10 @@ def machine(content: Content) -> Screen | None:
     if known and not trust:
         trust.append(Trust(Level.GREEN, "The model explains every signal", "identify"))
     if known:
-        coverage = f"{float(np.min(found['coverage'].to_numpy())):.0%}"
-        level = Level.GREEN if float(np.min(found["coverage"].to_numpy())) >= 0.9 else Level.AMBER
-        trust.append(
-            Trust(level, f"{coverage} of simulated machines lie in their 95 % interval", "identify")
-        )
+        coverage = float(np.min(found["coverage"].to_numpy()))
+        level = Level.GREEN if coverage >= 0.9 else Level.AMBER
+        text = f"{100 * coverage:.0f} % of simulated machines lie in their 95 % interval"
+        trust.append(Trust(level, text, "identify"))
     unknown = _unknowns(found) if known else []
     headline = "What to measure: expected half-widths of each signal"
     if unknown:
@@ -122,7 +121,7 @@ def _screened(found: Results) -> Iterator[Trust]:
         yield Trust(Level.GREEN, "Every variant is decided", "effects")
     if failed := int(np.sum(found["failed"].to_numpy())):
         yield Trust(Level.AMBER, f"{failed} simulations failed", "effects")
-    level = f"{float(found.attrs['confidence']):.0%}"
+    level = f"{100 * float(found.attrs['confidence']):.0f} %"
     yield Trust(Level.GREEN, f"Intervals of {level}, from averages over the same points", "effects")
 
 

@@ -88,12 +88,9 @@ def _tiles(lives: Results) -> Iterator[Tile]:
         yield Tile("median life, revolutions", median, within=f"95 % CI {low} to {high}")
         yield Tile("5th percentile, revolutions", early, within=f"95 % CI {least} to {most}")
         ends = (float(last[f"survival_{end}"]) for end in ("lower", "upper"))
-        within = " to ".join(f"{end:.0%}" for end in ends)
-        yield Tile(
-            f"no limit reached, {_long(cycles)} rev.",
-            f"{float(last['survival']):.0%}",
-            within=f"95 % CI {within}",
-        )
+        within = " to ".join(f"{100 * end:.0f} %" for end in ends)
+        label, share = f"no limit reached, {_long(cycles)} rev.", 100 * float(last["survival"])
+        yield Tile(label, f"{share:.0f} %", within=f"95 % CI {within}")
     for name, new, end, reach in _clearances(lives)[:1]:
         yield Tile(f"final clearance, {name}", end, new, within=reach and f"5 to 95 %: {reach}")
 

@@ -112,7 +112,7 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
     elif reach > bearings.SENSITIVE * abs(f):
         yield Trust(
             Level.AMBER,
-            f"f is sensitive to initial conditions or tolerance: ± {reach / abs(f):.0%}",
+            f"f is sensitive to initial conditions or tolerance: ± {100 * reach / abs(f):.0f} %",
             "bearings",
         )
     else:

@@ -19,18 +19,11 @@ from hpcclear.report.answer import (
     steps,
     surrogate_errors,
     unit_of,
-)
+)  # fmt: skip
 from hpcclear.report.constraints import ABSENT, OPEN, WORDS, verdict_of
 from hpcclear.report.figures import fits, labels
 from hpcclear.report.html.content import Content, scene_in
-from hpcclear.report.merit import (
-    baseline_of,
-    best_of,
-    goals_of,
-    is_plain,
-    ours_of,
-    usual_of,
-)
+from hpcclear.report.merit import baseline_of, best_of, goals_of, is_plain, ours_of, usual_of
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
     Level,
@@ -135,41 +128,45 @@ def _ends(one: Results, stem: str) -> tuple[float, float, float]:
     return value, low, high
 
 
-def _statistics(best: Results) -> Iterator[tuple[str, str]]:
-    """Stems of the values that are shown, and their words: what the case makes small, then what every design has."""
+def _statistics(best: Results) -> dict[str, str]:
+    """Words of the values that are shown, and their stems: what the case makes small, then what every design has."""
     asked = [] if is_plain(best) else goals_of(best)
     usual = {Usual.MEAN: "mean", Usual.DEVIATION: "deviation"}
-    shown = set()
-    for name in asked:
-        shown.add(usual.get(usual_of(best, name), name))
-        yield name, str(best[f"{name}_goal"].item())
+    shown = {usual.get(usual_of(best, name), name) for name in asked}
+    found = {str(best[f"{name}_goal"].item()): name for name in asked}
     for stem, words in _USUAL.items():
         if stem not in shown and (stem in best or f"{stem}_true" in best):
-            yield stem, f"{words} of f"
+            found.setdefault(f"{words} of f", stem)
+    return found
 
 
 def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
-    """Constraints and objectives of the case, then mean, standard deviation, percentile, and peak force."""
-    for own in _constraints(best):
-        unit, most = str(own["constraint_unit"].item()), float(own["constraint_most"])
-        value, low, high = (float(own[f"constraint_{end}"]) for end in ("true", "lower", "upper"))
-        verdict = Verdict(int(own["constraint_verdict"]))
-        known = f"95 % CI {labels.between(low, high, unit)}; " if low < high else ""
-        yield Tile(
-            str(own["constraint_goal"].item()),
-            labels.quantity(value, unit),
-            within=f"{known}at most {labels.quantity(most, unit)}: {WORDS[verdict]}",
-            good=verdict is Verdict.HOLDS,
-        )
-    for stem, words in _statistics(best):
+    """Constraints and objectives of the case, then mean, standard deviation, percentile, and peak force; each once."""
+    limits, known = {one.label: one for one in _limits(best)}, _statistics(best)
+    yield from (one for label, one in limits.items() if label not in known)
+    for words in sorted(known, key=lambda one: one not in limits):
+        stem = known[words]
         unit, mine = unit_of(best, stem if stem in best else f"{stem}_true"), _ends(best, stem)
         before = None if base is None else _ends(base, stem)
         moved, good = ("", None) if before is None else change(mine, before)
         shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
             better = None if verdict_of(best) in _INFEASIBLE else good  # no gain without a design
-            yield Tile(words, shown, "".join(old), moved, within(*mine, unit), better)
+            apart = limits[words].within if words in limits else within(*mine, unit)
+            yield Tile(words, shown, "".join(old), moved, apart, better)
     yield from _peaks(best, base, content)
+
+
+def _limits(best: Results) -> Iterator[Tile]:
+    """Constraints with their verdicts."""
+    for own in _constraints(best):
+        unit, most = str(own["constraint_unit"].item()), float(own["constraint_most"])
+        value, low, high = (float(own[f"constraint_{end}"]) for end in ("true", "lower", "upper"))
+        verdict = Verdict(int(own["constraint_verdict"]))
+        held = f"at most {labels.quantity(most, unit)}: {WORDS[verdict]}"
+        text = "; ".join(filter(None, (within(value, low, high, unit), held)))
+        shown, label = labels.quantity(value, unit), str(own["constraint_goal"].item())
+        yield Tile(label, shown, within=text, good=verdict is Verdict.HOLDS)
 
 
 def simulated(one: Results) -> list[list[str]]:
@@ -181,16 +178,10 @@ def simulated(one: Results) -> list[list[str]]:
 
 def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
     """The largest force of the stored responses: one run each, without an interval."""
-    found = [
-        content.responses.get(name)
-        for name in (_readable(best), "original" if base is not None else "")
-    ]
-    forces = [
-        float(np.nanmax(one["peak_contact_force"].to_numpy()))
-        if one is not None and "peak_contact_force" in one
-        else np.nan
-        for one in found
-    ]
+    names = (_readable(best), "original" if base is not None else "")
+    kept = [content.responses.get(name) for name in names]
+    known = [None if one is None else one.get("peak_contact_force") for one in kept]
+    forces = [np.nan if one is None else float(np.nanmax(one.to_numpy())) for one in known]
     if np.isfinite(forces[0]):
         moved = change((forces[0], np.nan, np.nan), (forces[1], np.nan, np.nan))
         value, old = labels.quantities(forces, "N")
