@@ -10,6 +10,7 @@ import argparse
 import re
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,12 +31,21 @@ class Output(NamedTuple):
     """Page with the command; others may show its output as well."""
     words: str
     """Words by which the command is found on it."""
+    rows: tuple[str, ...] = ()
+    """Labels of the rows that pages show; all rows if empty."""
 
 
 OUTPUTS = {
     "tutorial": Output("tutorial.md", "run jobs/quickstart.toml"),
     "effects": Output("how-to/effects.md", "effects jobs/slider_crank.toml"),
     "identify": Output("how-to/identify.md", "identify jobs/identify.toml --signal measured.csv"),
+    "tolerances": Output(
+        "how-to/tolerances.md",
+        "run jobs/tolerances.toml",
+        ("95th percentile of f", "cost", "fit", "trust"),
+    ),
+    "constraint": Output("how-to/decisions.md", "run jobs/tolerances.toml", ("constraint",)),
+    "halving": Output("how-to/decisions.md", "run jobs/tolerances.toml", ("tolerances",)),
 }
 
 
@@ -64,10 +74,14 @@ def _run(command: str, place: Path) -> str:
     return done.stdout.decode()
 
 
-def shown(text: str) -> str:
-    """The lines of an output that pages show: without those on files, whose places differ."""
-    lines = [line.rstrip() for line in text.splitlines()]
-    return "\n".join(one for one in lines if not one.startswith("written")).strip() + "\n"
+def shown(text: str, rows: tuple[str, ...] = ()) -> str:
+    """The lines of an output that pages show: rows of these labels; without those on files, whose places differ."""
+    kept, taken = [], True
+    for line in map(str.rstrip, text.splitlines()):
+        if line and not line.startswith("  "):  # no further line of the row before
+            taken = line.strip().startswith(rows or "") and not line.startswith("written")
+        kept += [line] * (taken and bool(line or not rows))
+    return textwrap.dedent("\n".join(kept)).strip() + "\n"
 
 
 def filled(page: Path) -> str:
@@ -88,7 +102,9 @@ def main() -> None:
     options = parser.parse_args()
     options.results.mkdir(parents=True, exist_ok=True)
     for name in options.names or OUTPUTS:
-        place_of(name).write_text(shown(printed(name, options.results)), encoding="utf-8")
+        place_of(name).write_text(
+            shown(printed(name, options.results), OUTPUTS[name].rows), encoding="utf-8"
+        )
     for page in sorted(DOCS.rglob("*.md")):
         page.write_text(filled(page), encoding="utf-8")
 
