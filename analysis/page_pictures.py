@@ -4,8 +4,8 @@ python analysis/page_pictures.py                            # all, into docs/ima
 python analysis/page_pictures.py stick-slip -o somewhere
 python analysis/page_pictures.py --screens results/quickstart results/response -o screens
 
-Screens: the first screen of the page of each directory of results, at 1280, 768 and 400 pixels, light and dark, and its first
-printed sheet; and how many words it has. They take Chromium with its driver, as the browser tests do.
+Screens: the first screen of the page of each directory of results, at 1280, 768 and 400 pixels, light and dark, and what is
+printed of it (PDF); and how many words it has. They take Chromium with its driver, as the browser tests do.
 """
 
 import argparse
@@ -106,12 +106,8 @@ def screens(places: list[Path], folder: Path) -> None:
             height = browser.run(
                 "return document.querySelector('.folds').getBoundingClientRect().top;"
             )
-            browser.command("Emulation.setEmulatedMedia", media="print")
-            sheet = {"width": 794, "height": 1123, "deviceScaleFactor": 1, "mobile": False}  # A4
-            browser.command("Emulation.setDeviceMetricsOverride", **sheet)
-            shot = browser.command("Page.captureScreenshot", format="png")
-            (folder / f"{place.name}-print.png").write_bytes(base64.b64decode(shot["data"]))
-            browser.command("Emulation.setEmulatedMedia", media="screen")
+            sheet = browser.command("Page.printToPDF", preferCSSPageSize=True)
+            (folder / f"{place.name}-print.pdf").write_bytes(base64.b64decode(sheet["data"]))
             print(
                 f"{place.name}: {first} words on the first screen, {browser.run(ALL_WORDS)} unfolded; folds at {height:.0f} px"
             )

@@ -35,7 +35,7 @@ def orbit_figure(response: Results) -> "style.Figure":
         _circle(panel, clearances[row])
         arc = _along(np.full_like(angle, clearances[row]), angle, contact)
         panel.plot(*arc, color=style.colour("ink"), lw=2.4, label="contact arc")
-        panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
+        panel.set_title(f"{joints[joint]}\n{motion.contact(shown, joint)}")
         _equal(panel, unit)
     style.legend(figure, axes[0, 0], "lower")
     return figure

@@ -47,7 +47,7 @@ def penetration_figure(response: Results) -> "style.Figure":
         depth = unit(shown["penetration"].sel(joint=joint))
         panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
-        panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
+        panel.set_title(f"{joints[joint]}\n{motion.contact(shown, joint)}")
         panel.set_ylabel(unit.label("penetration"))
     axes[0, 0].set_ylim(
         bottom=0.0

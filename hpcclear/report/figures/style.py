@@ -215,8 +215,8 @@ def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figur
 
 
 def side_by_side(count: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """`grid` of one column, axes of shape (count, 1); its panels, each so high, stand beside each other on a wide page."""
-    wide = count > 1 and across() > 1.5 * WIDTH and _given.get() is None
+    """`grid` of one column, axes of shape (count, 1); its panels, each so high, stand beside each other in a wide column."""
+    wide = count > 1 and column.get() > WIDTH and _given.get() is None
     columns = 1 + wide
     rows = -(-count // columns)
     figure, axes = grid(rows, columns, height * rows, **options if columns == 1 else {})
