@@ -34,9 +34,9 @@ PARTS = 3
 """Parts that `infill_designs` are simulated in, since each new design says where the next belongs."""
 
 WORTH, FRONT, AREA, PATIENCE = 0.2, 1.0, 0.01, 2
-"""What another design or more simulations are worth at least: of the accuracy requested, in what decides and in other
-directions, and of the area below a front of two objectives, with more a fifth of that of the distance to it; rounds in a row
-that are not, after which the search ends."""
+"""What another design or more simulations are worth at least, and what the design that is taken for the best may lose: of the
+accuracy requested, in what decides and in other directions, and of the area below a front of two objectives, with more a fifth
+of that of the distance to it; rounds in a row that are not, after which the search ends."""
 
 LEADERS, KNOWN = 3, 0.25
 """Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do."""
@@ -135,18 +135,35 @@ class CaseSearch:
             else:
                 left.append((worth / (least or self._least), point))
         self._idle = self._idle + 1 if len(left) == count else 0
-        if self._idle and left:  # the models may be wrong: there, and where nothing is known
-            point, apart = max(left, key=lambda one: one[0])[1], 1.0
-            while apart > 0.0 and len(beliefs.pending) < count:  # of a catalogue none may be left
-                beliefs.take(point)
-                rows += self.designs.add(point[None])
-                point, apart = improvement.farthest(beliefs)
+        if self._idle:
+            rows += self._beyond(beliefs, left)
         self._again = {row for row in rows if self.designs.made[row].size}
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):
             means, _ = beliefs.shortfalls(fresh)
             first = len(self.designs) - len(fresh)
             self._near |= {first + int(k) for k in np.flatnonzero(abs(means.max(axis=1)) < CLOSE)}
+        return rows
+
+    def _beyond(self, beliefs: Beliefs, left: Sequence[tuple[float, Array]]) -> list[int]:
+        """New designs where none is expected to win enough: those that may be the best, as long as the one that is taken for
+        it is expected to lose too much to them; then the best of those `left` and where nothing is known, since the models may
+        be wrong."""
+        main, rows, apart = self._space.directions[0], list[int](), 1.0
+        size = self._accuracy(beliefs, main)
+        point, loss = improvement.drawn(beliefs, main)
+        others = partial(improvement.drawn, beliefs, main)
+        if loss > WORTH * size > 0.0:
+            self._idle, self._hope = 0, loss / size
+        else:
+            point, others = (
+                max(left, key=lambda one: one[0])[1],
+                partial(improvement.farthest, beliefs),
+            )
+        while apart > 0.0 and len(rows) < len(left):  # of a catalogue none may be left
+            beliefs.take(point)
+            rows += self.designs.add(point[None])
+            point, apart = others()
         return rows
 
     def _leaders(self, beliefs: Beliefs) -> list[int]:

@@ -6,13 +6,16 @@ probability that it keeps the constraints, and less where its own error hides wh
 improvement); more simulations of a known design are worth what they may change in which design is
 taken for the best (knowledge gradient). Both are compared by simulation: few for a new design at first, more for
 contenders only ("replication or exploration"). Of several designs at a time each takes those before it for evaluated, at
-the value that is expected (Kriging believer).
+the value that is expected (Kriging believer). Where no design is expected to win enough, draws of what is believed of all
+designs together say what is lost if none is simulated any more, and which may be the best (Thompson sampling).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors D. Huang, T. T. Allen, W. I. Notz and N. Zeng,
 "Global optimization of stochastic black-box systems via sequential kriging meta-models", J. Global Optim. 34 (2006),
 doi:10.1007/s10898-005-2454-3; V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
 kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4;
+of draws W. R. Thompson, "On the likelihood that one unknown probability exceeds another in view of the evidence of two
+samples", Biometrika 25 (1933), doi:10.1093/biomet/25.3-4.285;
 M. Binois, J. Huang, R. B. Gramacy and M. Ludkovski, "Replication or exploration? Sequential design for stochastic simulation
 experiments", Technometrics 61 (2019), doi:10.1080/00401706.2018.1469433; the sum over strips M. Emmerich, K. Yang, A. Deutz,
 H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global optimization" (2016),
@@ -28,7 +31,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.statistics.search.beliefs import Beliefs, Space
+from hpcclear.statistics.search.beliefs import LIKELY, Beliefs, Space
 
 EXPLORED = 5
 """One new design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
@@ -40,7 +43,8 @@ NEAR = 3e-3
 """Largest difference of coordinates, in the unit cube, below which two designs are one."""
 
 DRAWS = 64
-"""Draws of three or more objectives for an expected improvement without a closed form."""
+"""Draws of what is believed: of three or more objectives for an expected improvement without a closed form, and of all designs
+together."""
 
 Merit = Callable[[Array], Array]
 
@@ -68,6 +72,26 @@ def expected(beliefs: Beliefs, direction: Array, margins: Array | None = None) -
         return np.where(broken > 0.0, -1e30 * (1.0 + broken), -(beliefs.means(points) @ direction))
 
     return _best(beliefs, merit)[0]
+
+
+def drawn(beliefs: Beliefs, direction: Array) -> tuple[Array, float]:
+    """The best new design, (d,), by one draw of what is believed of all together (Thompson sampling), and what the design that
+    is believed to be the best is expected to lose to the best of all; 0 where none is new."""
+    points = np.vstack([beliefs.known.designs[beliefs.allowed], _candidates(beliefs)])
+    points = points[beliefs.feasible(points) >= LIKELY]
+    new = _apart(points, beliefs)
+    if not new.any():
+        return beliefs.known.designs[0], 0.0
+    square = np.zeros((len(points), len(points)))
+    for model, weight in zip(beliefs.models, direction, strict=True):
+        if model is not None and weight:
+            square += weight**2 * model.rest.covariance(points)
+    values, vectors = np.linalg.eigh(square)
+    spread = vectors * np.sqrt(np.maximum(values, 0.0))
+    mean = beliefs.means(points) @ direction
+    paths = mean + beliefs.rng.standard_normal((DRAWS, len(points))) @ spread.T
+    loss = paths[:, mean.argmin()] - paths.min(axis=1)
+    return points[np.where(new, paths[0], np.inf).argmin()], float(loss.mean())
 
 
 def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0) -> Array:
@@ -176,16 +200,22 @@ def _scalarised(front: Array, drawn: Array, weights: Array) -> Array:
 def _best(beliefs: Beliefs, merit: Merit) -> tuple[Array, float]:
     """The candidate of most merit, (d,), moved by smaller and smaller steps while that helps; and its merit."""
     space, rng = beliefs.space, beliefs.rng
-    low, width = space.bounds[:, 0], space.bounds[:, 1] - space.bounds[:, 0]
-    points = [low + rng.random((WIDE, len(low))) * width]
-    for centre in _centres(beliefs):
-        points += [_about(centre, step, space, rng) for step in STEPS]
-    place, worth = _most(space.snap(np.concatenate(points)), merit)
+    place, worth = _most(_candidates(beliefs), merit)
     for step in STEPS:
         other, its = _most(space.snap(_about(place, step, space, rng)), merit)
         if its > worth:
             place, worth = other, its
     return place, worth
+
+
+def _candidates(beliefs: Beliefs) -> Array:
+    """Designs all over the box and about the best ones, (n, d)."""
+    space, rng = beliefs.space, beliefs.rng
+    low, width = space.bounds[:, 0], space.bounds[:, 1] - space.bounds[:, 0]
+    points = [low + rng.random((WIDE, len(low))) * width]
+    for centre in _centres(beliefs):
+        points += [_about(centre, step, space, rng) for step in STEPS]
+    return np.asarray(space.snap(np.concatenate(points)))
 
 
 def _most(points: Array, merit: Merit) -> tuple[Array, float]:

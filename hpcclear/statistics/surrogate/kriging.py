@@ -146,6 +146,13 @@ class Kriging:
         known = np.einsum("ij,ij->j", cross, cho_solve(self._factor, cross))
         return self.scale**2 * np.maximum(self.signal_variance - known, 0.0)
 
+    def covariance(self, points: np.ndarray) -> np.ndarray:
+        """Joint Kriging covariance (n, n) of the smooth part at points (n, d), in squared units of the training values."""
+        unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
+        cross = self._covariance(self.to_unit(self.inputs), unit)
+        known = cross.T @ cho_solve(self._factor, cross)
+        return np.asarray(self.scale**2 * (self._covariance(unit, unit) - known))
+
     @cached_property
     def _factor(self) -> tuple[Array, bool]:
         """Cholesky factor of the covariance of the training values."""
