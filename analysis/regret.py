@@ -249,6 +249,9 @@ STUDIES: dict[str, tuple[str, dict[str, Any]]] = {
 }  # fmt: skip
 """Studies of our own mechanisms, small enough to be judged."""
 
+KNOWN = {"compressor": [[0.15, 0.0904]]}
+"""Best designs that searches of earlier versions found, where the reference may miss them: they are judged as well."""
+
 DRIVES = {
     "torque": {
         "kind": "torque",
@@ -326,7 +329,8 @@ def measured(place: Path, label: str, scene: Scene, rounds: int) -> dict[str, An
         found = choices_of(scene, case, reference(scene, case, rounds, np.array(taken)))
         values, _, broken = merits(scene, found, told(scene, found, CHOSEN // REPLICATES, "chosen"))
         np.save(kept, list(found[int(np.where(broken, np.inf, values).argmin())].design.values()))
-    values, errors, broken, least = judged(scene, choices_of(scene, case, [*taken, np.load(kept)]))
+    rows = [*taken, np.load(kept), *KNOWN.get(label, [])]
+    values, errors, broken, least = judged(scene, choices_of(scene, case, rows))
     models = dataset.read(directory / "kriging.nc", "kriging").to_xarray()
     said, _ = forecast.expected(scene, partial(evaluated, scene), 1e-3)
     regret = (values[0] - values[least]) / abs(values[least])
