@@ -79,7 +79,7 @@ def test_pressure_is_force_over_projected_area_and_ideal_joints_are_left_out():
 @pytest.mark.parametrize("contact", [0.0, 1e-7, 0.0004, 0.5, 0.9996, 1.0 - 1e-9, 1.0])
 def test_no_share_is_rounded_to_all_or_nothing(contact):
     shown = bearings.share(contact)
-    assert (re.fullmatch(r"(0|100)%", shown) is not None) == (contact in (0.0, 1.0))
+    assert (re.fullmatch(r"(0|100) %", shown) is not None) == (contact in (0.0, 1.0))
 
 
 def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(tmp_path, capsys):

@@ -10,7 +10,6 @@ from running import HUNT_CROSSLEY, scene_with
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import response
-from hpcclear.dynamics.evaluation.recorded import between
 from hpcclear.dynamics.evaluation.recorded import steps as recorded
 from hpcclear.dynamics.evaluation.recorded.steps import StepInstants, Steps
 from hpcclear.dynamics.response import simulate
@@ -77,7 +76,7 @@ def test_dropped_steps_change_no_instant_s_state(monkeypatch, kind: str):
     even = np.linspace(0.0, lengths.sum(), 101)
     assert (np.diff(piece.times) > 0.0).all()
     assert np.abs(piece.times - even).max() < 0.5 * even[1]  # some eight rows are held for each
-    q, v, s = between._state(piece, 0.0)
+    q, v, s = recorded._state(piece, 0.0)
     assert ((s >= 0.0) & (s <= 1.0)).all()
     np.testing.assert_allclose(q[:, 0], np.sin(piece.times), atol=1e-9)
     np.testing.assert_allclose(v[:, 0], np.cos(piece.times), atol=1e-8)

@@ -173,7 +173,7 @@ CONTRADICTIONS = [
         "effects.contact.damping",
         "no fixed damping",
     ),
-    ({"drive": {**FREE, "torque": 1.0, "speed": 500.0}}, "drive.speed", "no prescribed speed"),
+    ({"drive": {**FREE, "torque": 1.0, "speed": 500.0}}, "drive.speed", "is a result of a torque"),
     ({"drive.torque": 1.0}, "drive.torque", "contradicts a prescribed"),
     ({"effects.contact": None}, "effects.contact", "needs a contact law"),
     (

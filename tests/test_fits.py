@@ -112,7 +112,7 @@ def test_published_clearances(text):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("20 H7/p6", "from -35 to -1 um"), ("20 H7/k6", "from -15 to 19 um"), ("20 H7/js6", "from -6.5 to 27.5 um"),
+        ("20 H7/p6", "leaves -35 to -1 um"), ("20 H7/k6", "leaves -15 to 19 um"), ("20 H7/js6", "leaves -6.5 to 27.5 um"),
         ("H7/f7", "nominal size in mm"), ("20 f7/H7", "hole, with its capital letter"), ("0 H7/f7", "no size above 0"),
         ("501 H7/f7", "to 500 mm"), ("12,5 H7/f7", "decimal point"), ("20 H12/f7", "no grade from 5 to 11"), ("20 H7",
         "20 H7/f7"),

@@ -132,7 +132,7 @@ def test_tables_are_read_into_data_and_assembled():
         ("bodies.coupler.mass", None, "bodies.coupler.mass", "missing"),
         ("bodies.coupler.weight", 1.0, "bodies.coupler.weight", "not a known key"),
         ("bodies.coupler.points.b", [0.12], "bodies.coupler.points.b", "pair"),
-        ("bodies.coupler.points", "a, b", "bodies.coupler.points", "named points"),
+        ("bodies.coupler.points", "a, b", "bodies.coupler.points", "{ NAME = [x, y] }"),
         ("bodies.rocker.like", "crnk", "bodies.rocker.like", "crank"),
         ("joints.o1.kind", "revolut", "joints.o1.kind", "revolute"),
         ("joints.o1.kind", None, "joints.o1.kind", '"slide"'),

@@ -13,7 +13,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function
-from hpcclear.base.unrolled import written_out
 from hpcclear.laws.declared import FilmLaw
 from hpcclear.laws.film import short
 from hpcclear.laws.reynolds import along_and_across, short_impedance, turned_against
@@ -138,8 +137,20 @@ def finite_scales(a, s2):
 def polynomial(par, row, y, i, W):
     """Of degree 14, from coefficients in the rows from `row` on."""
     p = par[(row + 14) * W + i]
-    for k in written_out(range(13, -1, -1)):
-        p = p * y + par[(row + k) * W + i]
+    p = p * y + par[(row + 13) * W + i]
+    p = p * y + par[(row + 12) * W + i]
+    p = p * y + par[(row + 11) * W + i]
+    p = p * y + par[(row + 10) * W + i]
+    p = p * y + par[(row + 9) * W + i]
+    p = p * y + par[(row + 8) * W + i]
+    p = p * y + par[(row + 7) * W + i]
+    p = p * y + par[(row + 6) * W + i]
+    p = p * y + par[(row + 5) * W + i]
+    p = p * y + par[(row + 4) * W + i]
+    p = p * y + par[(row + 3) * W + i]
+    p = p * y + par[(row + 2) * W + i]
+    p = p * y + par[(row + 1) * W + i]
+    p = p * y + par[(row + 0) * W + i]
     return p
 
 
@@ -147,8 +158,11 @@ def polynomial(par, row, y, i, W):
 def corrected(par, row, s2, x, y, i, W):
     """Force of a finite film over that of a short one, by 6 times 15 coefficients from `row` on (`correction`)."""
     p = polynomial(par, row + 75, y, i, W)
-    for k in written_out(range(60, -1, -15)):
-        p = p * x + polynomial(par, row + k, y, i, W)
+    p = p * x + polynomial(par, row + 60, y, i, W)
+    p = p * x + polynomial(par, row + 45, y, i, W)
+    p = p * x + polynomial(par, row + 30, y, i, W)
+    p = p * x + polynomial(par, row + 15, y, i, W)
+    p = p * x + polynomial(par, row, y, i, W)
     return s2 / p
 
 
