@@ -20,12 +20,21 @@ from hpcclear.base.outcome import Status
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import to_coordinates
+from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
-from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, tolerance
+from hpcclear.study import (
+    extent,
+    optimisation,
+    rare,
+    search,
+    stages,
+    surrogates,
+    tolerance,
+    truth,
+)
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
@@ -34,6 +43,9 @@ LONGEST = 10.0
 
 LEAST = 5
 """Simulations per input that a pilot needs."""
+
+DESIGNS, LENGTH = 4, 8
+"""Designs, and points of each of their replicates, that show how much scatter a surrogate leaves."""
 
 WAVES, SHORT = 128, 0.02
 """Waves that stand for what a surrogate does not explain, and their length scale, over the range of each input."""
@@ -63,7 +75,7 @@ class _Pilot(Simulations):
 class _Rehearsal(Simulations):
     """Surrogates of a pilot in place of simulations, which are counted by stage."""
 
-    def __init__(self, run: StudyRun, count: int) -> None:
+    def __init__(self, run: StudyRun, count: int, designs: int) -> None:
         super().__init__(run.scene, alone(), cast(Checkpoint, None), "quiet")
         names, region = run.study.models[-1], surrogates.domain(run, run.study.models[-1])
         rng, self._names = run.rng("pilot"), names
@@ -77,12 +89,7 @@ class _Rehearsal(Simulations):
         method = surrogates.method_of(run.scene)
         labels = [surrogates.coordinate(run.study.variable(name)) for name in names]
         self._models = [method.fit(places, one, bounds, rng=rng, names=labels) for one in responses]
-        self._sizes = [
-            one.scale * one.noise_variance**0.5
-            if isinstance(one, Kriging)
-            else float(np.std(one.values - one.leave_one_out()))
-            for one in self._models
-        ]
+        self._sizes = self._unexplained(run, designs)
         self._waves = rng.standard_normal((len(names), WAVES)) / SHORT
         self._phases = rng.uniform(0.0, 2.0 * np.pi, WAVES)
         self.counts = Counter[str]()
@@ -93,11 +100,29 @@ class _Rehearsal(Simulations):
         unknown = np.full(1, np.nan)
         return Piecewise((self._models[0],), unknown, unknown, np.zeros(1, bool))
 
-    def judged(self, points: Points, stage: str) -> tuple[Records, Array]:
-        """What surrogates say, with waves as large as their errors."""
+    def _places(self, points: Points) -> Array:
+        """Inputs of the surrogates, within their bounds."""
         leaf, names = self._models[0], [points.names.index(name) for name in self._names]
         places = to_coordinates(self.scene, self._names, points.values[:, names])
-        places = np.clip(places, leaf.lower, leaf.upper)
+        return np.clip(places, leaf.lower, leaf.upper)
+
+    def _unexplained(self, run: StudyRun, count: int) -> Array:
+        """Standard deviation of what surrogates leave of each response: of it replicates of so many designs scatter."""
+        case, squares = run.study.cases[0].name, []
+        region = box(run.scene, run.study.design_variables(case))
+        unit = unit_lhs(count, len(region.lower), run.rng("pilot", case))
+        places = region.lower + unit * (region.upper - region.lower)
+        for choice in optimisation.choices(run, case, places):
+            points = truth.scattered(run, choice, LENGTH, "pilot")
+            _, found = run.simulations.judged(points, "pilot")
+            off = found - [one.predict(self._places(points)) for one in self._models]
+            means = np.nanmean(off.reshape(len(off), -1, LENGTH), axis=2)
+            squares.append(LENGTH * np.nanvar(means, axis=1))
+        return np.asarray(np.sqrt(np.nanmean(squares, axis=0)))
+
+    def judged(self, points: Points, stage: str) -> tuple[Records, Array]:
+        """What surrogates say, with waves as large as the scatter that they leave."""
+        leaf, places = self._models[0], self._places(points)
         phases = (places - leaf.lower) / (leaf.upper - leaf.lower) @ self._waves + self._phases
         waves = np.sqrt(2.0 / WAVES) * np.cos(phases).sum(axis=1)
         found = np.array(
@@ -144,14 +169,16 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
 
     study, samples = scene.required_study, extent.samples_of(scene)
     each = seconds * extent.loads_of(scene)
-    count = min(study.samples, int(LONGEST / max(each, 1e-9)))
-    if study.worn or count < LEAST * len(study.models[-1]):
+    most, least = int(LONGEST / max(each, 1e-9)), LEAST * len(study.models[-1])
+    designs = min(DESIGNS, (most - least) // (REPLICATES * LENGTH))
+    count = min(study.samples, most - designs * REPLICATES * LENGTH)
+    if study.worn or designs < 1 or count < least:
         return sum(samples.values()), seconds
     pilot = _Pilot(scene, evaluate)
     run = _Run(scene, Path(), alone(), cast(Checkpoint, None), pilot, lambda text: None)
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            counts = _rehearsed(run, count, samples)
+            counts = _rehearsed(run, count, designs, samples)
     except InputError:
         return sum(samples.values()), seconds
     loads = extent.loads_of(scene)
@@ -159,9 +186,9 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     return sum(samples.values()), pilot.seconds / pilot.count
 
 
-def _rehearsed(run: StudyRun, count: int, samples: Mapping[str, int]) -> Counter[str]:
-    """Simulations by stage of search and verification, if f is as by so many simulations."""
-    simulations = _Rehearsal(run, count)
+def _rehearsed(run: StudyRun, count: int, looked: int, samples: Mapping[str, int]) -> Counter[str]:
+    """Simulations by stage of search and verification, if f is as by so many simulations and designs that are looked at."""
+    simulations = _Rehearsal(run, count, looked)
     run = replace(run, simulations=simulations)
     simulations.next = sum(samples[name] for name in ("sensitivity", "kriging") if name in samples)
     found = optimisation.optimise(run, simulations.model)
