@@ -11,6 +11,7 @@ from formula_study import contents, formula, on_ranks
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.base.verdict import Verdict
 from hpcclear.ensemble import single
 from hpcclear.ranks import leading
 from hpcclear.ranks.boundary import alone
@@ -28,8 +29,10 @@ from hpcclear.study import (
     run_study,
 )
 from hpcclear.study.paper import claims
+from hpcclear.study.paper.claims import ResponseEvidence
 from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.paper.recognition import is_the_papers
+from hpcclear.study.responses import QUANTITIES
 from hpcclear.study.stages import files_of
 
 Z = ("m2", "m3", "u2", "I2")
@@ -421,6 +424,12 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         ("effects.contact.restitution=0.5", True, True),
         ("drive.speed=3000 rpm", True, False),
         ("study.objective=peak-contact-force", True, False),
+        ("study.cases.robust={random=['C', 'm2'], objectives=['mean']}", True, False),
+        (
+            "study.cases.robust={random=['C'], constraints=[{statistic='mean', most='1 nm'}]}",
+            True,
+            False,
+        ),
         ("mechanism.rod.length=0.13", False, False),
         ("joints.crank_rod.bearing_radius=21 mm", False, False),
         ("joints.rod_slider.bearing.youngs_modulus=2 GPa", False, False),
@@ -432,6 +441,14 @@ def test_the_papers_scene_is_recognised_by_what_it_holds(entry, cites, compares)
     assert is_the_papers(scene) == compares
     assert ("claims.nc" in files_of(scene)) == compares
     assert bool(printed_designs(scene)) == compares
+
+
+def test_a_claim_on_designs_that_are_one_is_undecided():
+    names, values = np.array(["original", "robust alpha"]), np.ones((2, 3, 4, 5, 9))
+    found = ResponseEvidence({"names": names, "statistics": values})
+    verdict, text = found.judged([("robust beta", "robust alpha", "mean", QUANTITIES[0], 1)])
+    assert verdict == Verdict.UNDECIDED
+    assert "robust beta" in text
 
 
 OF_THE_OBJECTIVE = {

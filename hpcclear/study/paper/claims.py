@@ -207,7 +207,9 @@ class ResponseEvidence:
         self.statistics = series["statistics"]
 
     def change(self, a: str, b: str, statistic: str, quantity: str) -> tuple[float, float]:
-        """Relative change from design b to design a, and what it must exceed to be sure."""
+        """Relative change from design b to design a, and what it must exceed to be sure; NaN where one of them is missing."""
+        if not {a, b} <= set(self.names):  # both ends of a front may be one design
+            return np.nan, np.nan
         s, q = STATISTICS.index(statistic), QUANTITIES.index(quantity)
         one, other = (self.statistics[self.names.index(name), ..., s, q] for name in (a, b))
         reach = np.hypot(_reach(one), _reach(other))
@@ -223,7 +225,7 @@ class ResponseEvidence:
             refuted.append(sign * change < -sure)
             if np.isnan(change):
                 texts.append(
-                    f"{a} against {b}: {statistic} of {quantity} unknown, for a simulation failed"
+                    f"{a} against {b}: {statistic} of {quantity} unknown, for it was not simulated or failed"
                 )
             elif not supported[-1]:
                 texts.append(

@@ -2,8 +2,8 @@
 
 Nothing in a scene file says so. A scene is the paper's when it holds what the paper studies: the
 mechanism of its Tables 1 and 2 (`hpcclear.scene.describing`) with both clearances, at 5000 rpm, and
-a study of f, the mean gap, over its design variables and the clearance. Names, sizes and further
-variables are free.
+a study of the mean and the standard deviation of f, the mean gap, over its design variables and the
+clearance. Names, sizes and further variables are free.
 """
 
 import math
@@ -38,5 +38,6 @@ def is_the_papers(scene: Scene) -> bool:
         and scene.drive.kind == "constant-speed"
         and math.isclose(scene.number("drive.speed"), _SPEED, rel_tol=1e-9)
         and scene.objective.words == MEAN_GAP.words
+        and all(case.plain for case in scene.required_study.cases)
         and {"m2", "m3", "u2", "I2", "C"} <= own_names(scene).keys()
     )
