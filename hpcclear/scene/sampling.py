@@ -70,7 +70,7 @@ def _chances(
     purpose: str,
     names: Sequence[str],
     span: tuple[int, int],
-    replicate: int | None,
+    replicates: Sequence[int] | None,
     stratified: bool,
 ) -> list[Array]:
     """Independent probabilities of each name, `span`: from which index on and how many; as `monte_carlo` has them."""
@@ -80,10 +80,11 @@ def _chances(
             raise InputError("first", first, "a Latin hypercube cannot be divided", "Begin at 0")
         rng = generator(seed, f"stratified {purpose}")
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
-    if replicate is None:
+    if replicates is None:
         label = f"monte-carlo {purpose}"
         return [uniform(seed, label, name, first, count) for name in names]
-    return list(_scrambled(seed, purpose, replicate, len(names), first, count).T)
+    parts = [_scrambled(seed, purpose, one, len(names), first, count) for one in replicates]
+    return list(np.concatenate(parts).T)
 
 
 @lru_cache(maxsize=64)
@@ -105,7 +106,7 @@ def monte_carlo(
     design: Mapping[str, float] | None = None,
     purpose: str = "train",
     first: int = 0,
-    replicate: int | None = None,
+    replicate: int | Sequence[int] | None = None,
     stratified: bool = False,
 ) -> Points:
     """Samples `first` to `first + samples` of the study's random inputs (all of them, or those in `random`), SI.
@@ -117,9 +118,9 @@ def monte_carlo(
     distribution are uniform over their range, and inputs scatter about the scene.
 
     With a `replicate`, samples of the randomised Sobol sequence of this number replace independent ones; each sequence is one
-    independent estimate: begin and end at powers of two. `stratified`: a Latin hypercube of probabilities in their place; all
-    of it, so from index 0 on. Of inputs that vary together the first alone keeps its strata. Raises InputError as
-    `latin_hypercube`.
+    independent estimate: begin and end at powers of two. Of several, as many samples of each, one sequence after the other.
+    `stratified`: a Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together
+    the first alone keeps its strata. Raises InputError as `latin_hypercube`.
     """
     study = scene.required_study
     count = _count(study, samples, first)
@@ -132,7 +133,9 @@ def monte_carlo(
     names = (*free, *(name for name in chosen if name not in free))
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     moving = [name for name in names if name in chosen or fixed is None]
-    uniform = _chances(study.seed, purpose, moving, (first, count), replicate, stratified)
+    replicates = [replicate] if isinstance(replicate, int) else replicate
+    uniform = _chances(study.seed, purpose, moving, (first, count), replicates, stratified)
+    count *= len(replicates or [0])
     if study.correlation is not None:
         uniform = _together(study.correlation, moving, chosen, uniform)
     places = dict(zip(moving, uniform, strict=True))

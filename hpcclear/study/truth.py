@@ -35,22 +35,25 @@ def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verifi
     Every design of a case meets the same scatter, so that differences between designs are not
     noise.
     """
-    points = _of_design(run, choice, count, purpose, 0, None)
-    return run.simulations.filled(points.names, points.values)
+    return _of_design(run, choice, count, purpose, 0, None)
 
 
 def scattered(
     run: StudyRun, choice: Choice, count: int, purpose: str = "verification", first: int = 0
 ) -> Points:
     """The points from `first` on of all replicates of a design, `count` of each, one replicate after the other."""
-    made = [_of_design(run, choice, count, purpose, first, k) for k in range(REPLICATES)]
-    return run.simulations.filled(made[0].names, np.concatenate([one.values for one in made]))
+    return _of_design(run, choice, count, purpose, first, range(REPLICATES))
 
 
 def _of_design(
-    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, replicate: int | None
+    run: StudyRun,
+    choice: Choice,
+    count: int,
+    purpose: str,
+    first: int,
+    replicate: Sequence[int] | None,
 ) -> Points:
-    return monte_carlo(
+    points = monte_carlo(
         run.scene,
         count,
         random=run.study.case(choice.case).random,
@@ -59,6 +62,7 @@ def _of_design(
         first=first,
         replicate=replicate,
     )
+    return run.simulations.filled(points.names, points.values)
 
 
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:

@@ -46,6 +46,9 @@ DRAWS = 64
 """Draws of what is believed: of three or more objectives for an expected improvement without a closed form, and of all designs
 together."""
 
+ROUND_OFF = 1e-9
+"""Added to variances, over the sum of all: so far a covariance may be from a positive one."""
+
 Merit = Callable[[Array], Array]
 
 
@@ -86,10 +89,10 @@ def drawn(beliefs: Beliefs, direction: Array) -> tuple[Array, float]:
     for model, weight in zip(beliefs.models, direction, strict=True):
         if model is not None and weight:
             square += weight**2 * model.rest.covariance(points)
-    values, vectors = np.linalg.eigh(square)
-    spread = vectors * np.sqrt(np.maximum(values, 0.0))
+    square[np.diag_indices_from(square)] += ROUND_OFF * (square.trace() + 1e-300)
     mean = beliefs.means(points) @ direction
-    paths = mean + beliefs.rng.standard_normal((DRAWS, len(points))) @ spread.T
+    draws = beliefs.rng.standard_normal((DRAWS, len(points)))
+    paths = mean + draws @ np.linalg.cholesky(square).T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)
     return points[np.where(new, paths[0], np.inf).argmin()], float(loss.mean())
 

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel, correlation
@@ -176,6 +177,5 @@ class Kriging:
         return matrix
 
     def _covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        steps = (a[:, None, :] - b[None, :, :]) / self.length_scales
-        squares = np.einsum("ijk,ijk->ij", steps, steps)
+        squares = cdist(a / self.length_scales, b / self.length_scales, "sqeuclidean")
         return self.signal_variance * correlation(squares, self.kernel)
