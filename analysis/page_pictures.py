@@ -1,16 +1,10 @@
-"""Pictures on pages of docs/how-to, each of the scene that its page has readers write; and screens of reports.
+"""Pictures on pages of docs/how-to, each of the scene that its page has readers write.
 
 python analysis/page_pictures.py                            # all, into docs/images
 python analysis/page_pictures.py stick-slip -o somewhere
-python analysis/page_pictures.py --screens results/quickstart results/response -o screens
-
-Screens: the first screen of the page of each directory of results, at 1280, 768 and 400 pixels, light and dark, and what is
-printed of it (PDF); and how many words it has. They take Chromium with its driver, as the browser tests do.
 """
 
 import argparse
-import base64
-import sys
 from pathlib import Path
 
 import matplotlib
@@ -72,49 +66,6 @@ def stick_slip() -> Figure:
     return figure
 
 
-WORDS = """
-return [...document.querySelectorAll("header, .tiles, #table, .trust")].map(e => e.innerText).join(" ").split(/\\s+/).length;
-"""
-"""Words of headline, figures, design and verdicts."""
-
-ALL_WORDS = """
-document.querySelectorAll("details").forEach(e => { e.open = true; });
-return document.body.innerText.split(/\\s+/).filter(w => w).length;
-"""
-
-
-def screens(places: list[Path], folder: Path) -> None:
-    """Write pages of results, their pictures, and print their words and heights."""
-    sys.path.insert(0, str(ROOT / "tests"))
-    from browser import Browser
-
-    from hpcclear.report.html.page import write_report
-
-    folder.mkdir(parents=True, exist_ok=True)
-    browser = Browser()
-    try:
-        for place in places:
-            page = write_report(place)
-            for width in (1280, 768, 400):
-                for scheme in ("light", "dark"):
-                    browser.open(page, width, scheme)
-                    shot = browser.command("Page.captureScreenshot", format="png")
-                    name = f"{place.name}-{width}-{scheme}.png"
-                    (folder / name).write_bytes(base64.b64decode(shot["data"]))
-            browser.open(page, 1280)
-            first = browser.run(WORDS)
-            height = browser.run(
-                "return document.querySelector('.folds').getBoundingClientRect().top;"
-            )
-            sheet = browser.command("Page.printToPDF", preferCSSPageSize=True)
-            (folder / f"{place.name}-print.pdf").write_bytes(base64.b64decode(sheet["data"]))
-            print(
-                f"{place.name}: {first} words on the first screen, {browser.run(ALL_WORDS)} unfolded; folds at {height:.0f} px"
-            )
-    finally:
-        browser.close()
-
-
 PICTURES = {"elastic-rod": elastic_rod, "stick-slip": stick_slip}
 
 
@@ -122,13 +73,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("page", nargs="?", choices=["all", *PICTURES], default="all")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "images")
-    parser.add_argument(
-        "--screens", nargs="+", type=Path, metavar="DIRECTORY", help="reports to show instead"
-    )
     options = parser.parse_args()
-    if options.screens:
-        screens(options.screens, options.output)
-        sys.exit()
     for name in PICTURES if options.page == "all" else [options.page]:
         figure = PICTURES[name]()
         figure.align_ylabels()
