@@ -18,9 +18,11 @@ from scipy.integrate import solve_ivp
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.scene.contacts.guide import PlanarSlide
+from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
+from hpcclear.scene.contacts.pin_in_slot import PlanarSlot
 from hpcclear.scene.driving import PlanarRunUp, PlanarSpeed
-from hpcclear.scene.joints import PlanarSlot
-from hpcclear.scene.planar import Pin, PlanarClearance, PlanarFixed, PlanarSlide
+from hpcclear.scene.joints import PlanarFixed, PlanarRevolute
 
 
 class Jet:
@@ -121,7 +123,7 @@ class Dense:
         rows = {}
         for joint in self.mechanism.ideal:
             (x, y), (bx, by) = (self.place(q, place) for place in m.places_of(joint))
-            if isinstance(joint, Pin):
+            if isinstance(joint, PlanarRevolute):
                 rows |= {(joint.name, "x"): x - bx, (joint.name, "y"): y - by}
                 continue
             tilt = self.angle(q, joint.line) + joint.angle

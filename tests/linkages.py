@@ -4,11 +4,13 @@ import math
 from dataclasses import replace
 
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Body, corners_of, split
+from hpcclear.dynamics.linkage.parts import Body, split
+from hpcclear.scene.contacts.guide import PlanarSlide
+from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
+from hpcclear.scene.contacts.pin_in_slot import PlanarSlot
 from hpcclear.scene.driving import PlanarHarmonic, PlanarSpeed, PlanarTorque
-from hpcclear.scene.joints import IdealPinFriction, JointFriction, PlanarSlot
+from hpcclear.scene.joints import IdealPinFriction, JointFriction, PlanarFixed, PlanarRevolute
 from hpcclear.scene.loads import KINDS
-from hpcclear.scene.planar import PlanarClearance, PlanarFixed, PlanarRevolute, PlanarSlide
 
 
 def rows(table, kind, names):
@@ -294,7 +296,7 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
         for joint in loose.values():
             own, point = split(joint.point)
             if own == body.name:
-                points |= corners_of(joint, points[point])
+                points |= joint.further_points(points[point])
         guided = len(points) > len(body.points)
         inertia = 3e-5 if guided and not body.inertia else body.inertia
         bodies.append(replace(body, points=points, inertia=inertia))

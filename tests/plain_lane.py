@@ -11,13 +11,13 @@ from some_laws import row as row_of_law
 
 from hpcclear.base import bits
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts import guide, pin_in_bearing
+from hpcclear.dynamics.contacts import bearing, wall
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.physics import angles, friction
-from hpcclear.scene.planar import PlanarSlide
+from hpcclear.scene.contacts.guide import PlanarSlide
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
@@ -88,8 +88,8 @@ class Lane:
         rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, free=100, curves=curves)
         self.text = generate(mechanism, on, rows, **options)
         names = {
-            "joint_force": plain(pin_in_bearing.joint_force),
-            "corner_force": plain(guide.corner_force),
+            "joint_force": plain(bearing.joint_force),
+            "wall_force": plain(wall.wall_force),
             "sincos": plain(angles.sincos),
             "saturated": plain(friction.saturated),
         }
@@ -107,7 +107,7 @@ class Lane:
             joint = contact.joint
             first = BLOCKS + at.JOINT_ROWS * k
             block = self.par[first : first + at.JOINT_ROWS]
-            shape = contact.geometry.shape(partial(getattr, joint))
+            shape = joint.shape(partial(getattr, joint))
             block[at.CLEARANCE] = shape.clearance
             block[row_of_law("contact", "hunt-crossley", "stiffness")] = stiffness(joint)
             block[row_of_law("contact", "hunt-crossley", "damping")] = CHI

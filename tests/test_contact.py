@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from hpcclear.dynamics.contacts.laws import in_lanes
-from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.laws import laws
 from hpcclear.laws.checks import check
 from hpcclear.laws.friction import ambrosio, coulomb
@@ -20,6 +19,7 @@ from hpcclear.laws.hertz_contact import (
     reduced_compliance,
     sphere_stiffness,
 )
+from hpcclear.scene.contacts.pin_in_bearing import PinInBearing
 
 LATCHED = sorted(name for name, law in laws("contact").items() if law.latched)
 
@@ -121,7 +121,7 @@ def test_a_contact_never_pulls_and_touches_softly(depth, rate, damping, speed):
 def test_hertz_is_the_cited_form():
     """Eq. 4 with R_J under the root: 4 / (3 (h_B + h_J)) sqrt(R_B R_J / c), the paper's materials."""
     h = [reduced_compliance(E, nu) for E, nu in ((0.5e9, 0.38), (206.8e9, 0.29))]
-    shape = GEOMETRIES["pin_in_bearing"].shape({"bearing_radius": 0.02, "clearance": 0.05e-3}.get)
+    shape = PinInBearing.shape({"bearing_radius": 0.02, "clearance": 0.05e-3}.get)
     K = sphere_stiffness(*h, shape.radius)
     expected = 4 / 3 / (0.8556 / 0.5e9 + 0.9159 / 206.8e9) * math.sqrt(0.02 * 0.01995 / 5e-5)
     assert pytest.approx(expected, rel=1e-12) == K

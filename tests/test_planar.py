@@ -17,7 +17,8 @@ from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.scene.planar import Planar, PlanarClearance
+from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
+from hpcclear.scene.planar import Planar
 from hpcclear.scene.validation import validated
 
 TEXT = """

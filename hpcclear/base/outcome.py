@@ -15,17 +15,8 @@ JOINTS = ("crank_rod", "rod_slider")
 MAX_JOINTS = 8
 """Largest number of contacts of a record, one in a pin, two in a slot, four in a guide; datasets contain those of the scene."""
 
-CORNERS = {
-    "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
-    "back_right": (-1.0, -1.0), "back_left": (-1.0, 1.0),
-}  # fmt: skip
-"""Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
-
 MAX_BANDS = 4
 """Largest number of third-octave bands whose levels a record has."""
-
-WALLS = {"left": 1.0, "right": -1.0}
-"""Contacts of a pin in a slot with clearance, the slot's walls on either side of its line."""
 
 WAVE_ROWS = 32
 """Largest number of profile coefficients of all joints."""

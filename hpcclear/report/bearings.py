@@ -11,7 +11,6 @@ from hpcclear.base.outcome import Flag
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import scene_in
 from hpcclear.results.content import Results
-from hpcclear.scene.joints import length_path
 
 ROUNDING = 1e-12
 """Of the largest torque: a smaller mean is zero but for rounding."""
@@ -243,7 +242,7 @@ def _projected_areas(response: Results) -> dict[str, float]:
     if (scene := scene_in(str(response.attrs.get("scene")))) is None:
         return {}
     pins = {joint: scene.pin(joint) for joint in scene.pins()}
-    lengths = {joint: path for joint, one in pins.items() if (path := length_path(one)) is not None}
+    lengths = {joint: path for joint, one in pins.items() if (path := one.length_path) is not None}
     return {
         joint: 2.0 * pins[joint].bearing_radius * float(attrgetter(path)(pins[joint]))
         for joint, path in lengths.items()

@@ -11,7 +11,6 @@ from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.joints import Guide, length_path
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
 from hpcclear.scene.slider_crank import JOINTS
@@ -100,7 +99,7 @@ class ConsistentTables(SceneTables):
             reason = "a slider in a guide with clearance can turn, so it needs an inertia"
             remedy = "Write its moment of inertia about its pin in kg m2"
             raise invalid(reason, remedy, "mechanism.slider.inertia")
-        (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
+        (guide,) = (joint for joint in self.linkage.joints if joint.kind == "slide")
         with self._named_as_written("joints.guide"):
             guide.check()
 
@@ -119,9 +118,8 @@ class ConsistentTables(SceneTables):
         contact = self.effects.contact
         if contact is not None and contact.has_length:
             for name in clearance:
-                if length_path(self.clearance_joint(name)) is None:
-                    is_pin = name in self.pins()
-                    entry, part = ("length", "bearing") if is_pin else ("width", "slider")
+                if self.clearance_joint(name).length_path is None:
+                    entry, part = self.clearance_joint(name).long_entry
                     reason = (
                         f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}'
                     )

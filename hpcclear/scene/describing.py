@@ -163,8 +163,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
         size = scene.shown(f"{scene.joint_key(name)}.clearance")
         joint = scene.clearance_joint(name)
-        kind = {"slide": "guide", "slot": "slot"}.get(joint.kind, "joint")
-        where = "the guide" if kind == name == "guide" else f"{kind} {name}"
+        where = f"the {name}" if joint.noun == name else f"{joint.noun} {name}"
         yield f"clearance {size} in {where}"
         if joint.out_of_round is not None:
             yield f"joint {name} out of round"

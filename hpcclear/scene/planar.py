@@ -2,12 +2,13 @@
 `dynamics/planar/tables.py` makes a mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union
 
 from pydantic import Field, model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
+from hpcclear.scene.contacts import KINDS as LOOSE
 from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
 from hpcclear.scene.fields import (
@@ -25,14 +26,7 @@ from hpcclear.scene.fields import (
     invalid,
     nearest,
 )
-from hpcclear.scene.joints import (
-    Guide,
-    IdealPinFriction,
-    JointFriction,
-    Materials,
-    PinInBearing,
-    PlanarSlot,
-)
+from hpcclear.scene.joints import PlanarFixed, PlanarRevolute
 from hpcclear.scene.loads import AnyLoad
 
 
@@ -172,69 +166,15 @@ class Ground(Table):
     """Named points of the ground, m."""
 
 
-class PlanarRevolute(Table):
-    """A pin without clearance."""
-
-    name: str
-    kind: Literal["revolute"]
-    journal: str
-    """``body.point``, or ``ground.point``."""
-    bearing: str
-    """``body.point``, or ``ground.point``."""
-    friction: IdealPinFriction | None = None
-    """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
+JOINTS: dict[str, type[Table]] = {"revolute": PlanarRevolute, **LOOSE, "fixed": PlanarFixed}
+"""Tables of joints by their kinds."""
+if TYPE_CHECKING:
+    PlanarJoint = Any
+else:
+    PlanarJoint = Annotated[Union[tuple(JOINTS.values())], Field(discriminator="kind")]  # noqa: UP007
 
 
-class PlanarClearance(PinInBearing):
-    """A pin with clearance: a journal within a larger bearing."""
-
-    name: str
-    journal: str
-    """``body.point`` at the centre of the journal."""
-    bearing: str
-    """``body.point`` or ``ground.point`` at the centre of the bearing."""
-    materials: Materials
-
-
-class PlanarSlide(Guide):
-    """A guide on the ground or on a body; with clearance, a rectangular slider in a channel that is a little higher."""
-
-    name: str
-    kind: Literal["slide"]
-    point: str
-    """``body.point`` that moves along the line; with clearance, the middle of the slider."""
-    line: str
-    """``body.point``, or ``ground.point``, on the line."""
-    angle: Angle = 0.0
-    """Direction of the line in the axes of the body that carries it, rad."""
-    friction: JointFriction | None = None
-    """Friction of a guide without clearance. Without it the guide is frictionless."""
-    materials: Materials | None = None
-    """Materials of channel (bearing) and slider (journal) of a guide with clearance."""
-
-
-class PlanarFixed(Table):
-    """A body that is fixed to the ground."""
-
-    name: str
-    kind: Literal["fixed"]
-    point: str
-    """``body.point`` that is fixed."""
-    line: str
-    """``ground.point`` to which it is fixed."""
-    angle: Angle = 0.0
-    """Angle of the body relative to the ground, rad."""
-
-
-Pin = PlanarRevolute | PlanarClearance
-Aligned = PlanarSlide | PlanarSlot | PlanarFixed
-"""Joints with a line."""
-Loose = PlanarClearance | PlanarSlide | PlanarSlot
-"""Tables of joints that may have clearance."""
-PlanarJoint = Annotated[Pin | Aligned, Field(discriminator="kind")]
-
-
-def is_loose(joint: object) -> TypeGuard[Loose]:
+def is_loose(joint: object) -> bool:
     """Whether a joint has clearance."""
     return getattr(joint, "clearance", None) is not None
 

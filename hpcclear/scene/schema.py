@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pydantic.json_schema import JsonSchemaValue
 
 from hpcclear.base.objectives import ENDS
+from hpcclear.scene.contacts.guide import Guide
 from hpcclear.scene.fields import NUMBER, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
-from hpcclear.scene.joints import Guide
 from hpcclear.scene.random_inputs import OURS
 from hpcclear.scene.scene import Scene
 

@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.base.written import shown
+from hpcclear.scene.contacts.guide import Guide, PlanarSlide
+from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
 from hpcclear.scene.driving import (
     CrankSpeed,
     CrankTorque,
@@ -28,24 +30,14 @@ from hpcclear.scene.fields import (
     Table,
     invalid,
 )
-from hpcclear.scene.joints import (
-    Guide,
-    IdealPinFriction,
-    Material,
-    Materials,
-    PinInBearing,
-    SliderGuide,
-)
+from hpcclear.scene.joints import IdealPinFriction, Material, Materials, PlanarRevolute
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.planar import (
     BarBending,
     Ground,
     Planar,
     PlanarBody,
-    PlanarClearance,
     PlanarJoint,
-    PlanarRevolute,
-    PlanarSlide,
 )
 
 
@@ -125,6 +117,18 @@ class IdealJoint(Table):
                 if key not in ClearanceJoint.model_fields or key == "kind"
             }
         return data
+
+
+class SliderGuide(Guide):
+    """The guide of a slider-crank, with clearance."""
+
+    kind: Literal["slide"]
+    clearance: PositiveLength
+    """Gap on either side of a slider in the middle of its channel, m."""
+    bearing: Material
+    """Material of the channel."""
+    journal: Material
+    """Material of the slider."""
 
 
 Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]

@@ -15,7 +15,7 @@ from hpcclear.scene.driving import CrankTorque, speed_entry
 from hpcclear.scene.fields import Content
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import Planar, PlanarClearance, turns_of
+from hpcclear.scene.planar import Planar, turns_of
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.validation import scene_of
 
@@ -78,14 +78,17 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        ideal: Content | None
+        ideal = joint.ideal()
+        if ideal is None:
+            continue
+        entries: Content | None = {
+            name: getattr(ideal, name)
+            for name in type(ideal).model_fields
+            if name in ideal.model_fields_set - {"name"}
+        }
         if scene.template is not None:
-            ideal = {"kind": "ideal"} if isinstance(joint, PlanarClearance) else None
-        elif isinstance(joint, PlanarClearance):
-            ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        else:
-            ideal = {name: getattr(joint, name) for name in ("kind", "point", "line", "angle")}
-        yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
+            entries = {"kind": "ideal"} if joint.round else None
+        yield Switch(f"clearance in {label}", {scene.joint_key(label): entries}, joint=label)
 
 
 def _films(scene: Scene) -> Iterator[Switch]:

@@ -17,13 +17,14 @@ from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.about import About, inputs_of
 from hpcclear.scene.choices import input_entry
+from hpcclear.scene.contacts.declared import AlongLine
+from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Table, nearest
-from hpcclear.scene.joints import Guide
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
-from hpcclear.scene.planar import BarBending, Loose, Planar, PlanarClearance, is_loose
+from hpcclear.scene.planar import BarBending, Planar, is_loose
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 from hpcclear.scene.study import Study
@@ -179,7 +180,7 @@ class SceneTables(Table):
         return slider_crank.linkage_of(self.mechanism, self.drive, self.joints, self.effects)
 
     @cached_property
-    def _loose(self) -> dict[str, Loose]:
+    def _loose(self) -> dict[str, Any]:
         """Tables of the joints with clearance by their names."""
         return {joint.name: joint for joint in self.linkage.joints if is_loose(joint)}
 
@@ -210,11 +211,11 @@ class SceneTables(Table):
 
     def pins(self) -> tuple[str, ...]:
         """Names of the joints with clearance that are pins in bearings."""
-        return tuple(name for name, joint in self._loose.items() if not joint.corners)
+        return tuple(name for name, joint in self._loose.items() if joint.round)
 
     def guides(self) -> tuple[str, ...]:
         """Names of the guides and slots with clearance."""
-        return tuple(name for name, joint in self._loose.items() if joint.corners)
+        return tuple(name for name, joint in self._loose.items() if isinstance(joint, AlongLine))
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
@@ -237,7 +238,7 @@ class SceneTables(Table):
         found = {}
         for one in self.linkage.joints:
             if (rubs := getattr(one, "friction", None)) is not None:
-                kind = "guide" if isinstance(one, Guide) else "pin"
+                kind = "guide" if one.kind == "slide" else "pin"
                 key = self.path_in_scene(f"mechanism.joints.{one.name}.friction")
                 where = "" if key == "effects.guide_friction" else f" in {one.name}"
                 found[key] = f"{kind} friction{where}", rubs.coefficient
@@ -249,7 +250,7 @@ class SceneTables(Table):
         assert isinstance(found, PlanarClearance)
         return found
 
-    def clearance_joint(self, label: str) -> Loose:
+    def clearance_joint(self, label: str) -> Any:
         """The table of a joint with clearance, or of a contact's joint."""
         return self._loose[label.partition(".")[0]]
 

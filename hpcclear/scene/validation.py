@@ -15,6 +15,7 @@ from hpcclear.scene import domain
 from hpcclear.scene.fields import LARGEST, Content, Table, hint, invalid, nearest
 from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
+from hpcclear.scene.planar import JOINTS
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
@@ -31,7 +32,7 @@ _KINDS = {
     "drive": '"constant-speed" or "torque"',
     "joints.crank_rod": '"clearance" or "ideal"',
     "joints.rod_slider": '"clearance" or "ideal"',
-    "joints": '"revolute", "clearance", "slide", "slot" or "fixed"',
+    "joints": " or ".join(f'"{kind}"' for kind in JOINTS),
     "drives": '"constant-speed", "harmonic" or "torque"',
     "loads": " or ".join(f'"{kind}"' for kind in LOADS),
 }

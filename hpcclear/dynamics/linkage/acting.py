@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sized
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics
 
 
@@ -73,11 +73,7 @@ class Acting:
         self, function: Callable[..., object], *terms: Term, results: tuple[str, ...]
     ) -> tuple[Term, ...]:
         """What a function of numbers returns, by names: one without branches, of arithmetic, ``abs`` and ``np.sqrt``."""
-        write = self._writer
-        texts = [write.text(term) for term in terms]
-        made = [write.fresh(f"{name}_{self._load}") for name in results]
-        write.line(f"{', '.join(made)} = {write.called(function)}({', '.join(texts)})")
-        return tuple(map(named, made))
+        return self._writer.call(function, terms, [f"{name}_{self._load}" for name in results])
 
     def hinge(self, name: str, beyond: Term, slope: Term) -> Term:
         """`slope` times what is above 0 of a term."""

@@ -19,7 +19,6 @@ from hpcclear.dynamics.linkage.parts import (
     as_complex,
     places_of,
     split,
-    start_of,
 )
 from hpcclear.dynamics.linkage.trees import forest
 
@@ -170,10 +169,7 @@ def _eccentricities(loops: Loops) -> Array:
     wanted: list[Number] = [0.0] * len(loops.owners)
     for joint in loops.mechanism.clearances:
         rows = [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
-        start = start_of(joint)
-        if joint.kind == "slide":
-            start = start[0], np.sin(start[1])
-        for r, apart in zip(rows, start, strict=True):
+        for r, apart in zip(rows, joint.start(), strict=True):
             wanted[r] = apart
     return np.array(np.broadcast_arrays(*wanted), float)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics, Move, Mover, Point
-from hpcclear.dynamics.linkage.parts import GROUND, KINDS, Body, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, Body, is_joint, places_of, split
 from hpcclear.dynamics.linkage.trees import Forest
 
 Held = tuple[str, Vector]
@@ -289,6 +289,6 @@ def _falling(forest: Forest) -> set[str]:
     roots = {body: root_of(forest, body) for body in forest.hangs}
     held = {GROUND}
     for one in forest.closures:
-        names = [split(p)[0] for p in places_of(one)] if one.kind in KINDS else [one.body]
+        names = [split(p)[0] for p in places_of(one)] if is_joint(one) else [one.body]
         held |= {roots.get(name, GROUND) for name in names}
     return {body for body, root in roots.items() if root not in held}

@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, TableRow, places_of, split
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Drive,
+    Joint,
+    TableRow,
+    is_joint,
+    is_pin,
+    places_of,
+    split,
+)
 
 
 class ClosureRow(NamedTuple):
@@ -36,13 +45,11 @@ class Closing:
 
     def rows(self, one: TableRow) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
-        if one.kind in PINS:
+        if is_pin(one):
             return self._pin(one)
-        if one.kind == "slide":
-            return self._guide(one)
-        if one.kind == "slot":
-            return self._guide(one)[:1]
-        assert one.kind != "fixed"
+        if is_joint(one):
+            assert one.kind != "fixed"
+            return self._guide(one)[: one.holds]
         return [self._driven(one)]
 
     def _row(

@@ -18,10 +18,15 @@ import numpy as np
 from hpcclear.base.bits import beyond, carray
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-{geometries}from hpcclear.dynamics.linkage.elements import {elements}
+{contacts}from hpcclear.dynamics.linkage.elements import {elements}
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 '''
+
+_FORCES = {
+    "bearing": "from hpcclear.dynamics.contacts.bearing import joint_force\n",
+    "wall": "from hpcclear.dynamics.contacts.wall import wall_force\n",
+}
 
 _MOTION = '''
 lane_in_place = lane_function(lane.py_func)
@@ -72,10 +77,10 @@ def module_with(motion: Motion, places: Iterable[int]) -> ModuleType:
         )
         for row, one in ((row, motion.look_ups[name]) for name, row in motion.curves.items())
     )
-    geometries = dict.fromkeys(c.geometry for c in motion.forest.mechanism.contacts)
+    kinds = {"bearing" if c.joint.round else "wall" for c in motion.forest.mechanism.contacts}
     called = [name for name in functions() if f" {name}(" in motion.source + looked_up]
     head = _HEAD.format(
-        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries),
+        contacts="".join(_FORCES[one] for one in sorted(kinds)),
         elements=", ".join(called or ["look_up"]),
     )
     held = f"JOINTS = tuple(map(at.Joint, {tuple(places)}))"

@@ -2,7 +2,6 @@
 
 import keyword
 
-from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
@@ -11,14 +10,15 @@ from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Contact, Drive, split
+from hpcclear.dynamics.linkage.parts import GROUND, Contact, Drive, is_pin, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
+from hpcclear.dynamics.linkage.touching import Touching
 from hpcclear.dynamics.linkage.trees import forest
 
 RESERVED = (
     *keyword.kwlist, "effects", "joints", "work", "par", "i", "W", "at", "abs", "np", "sincos", "saturated", *functions(),
-    *(one.function for one in GEOMETRIES.values()),
+    "joint_force", "wall_force",
 )  # fmt: skip
 """Names that a text has already, and that a value of a load or drive must not hide."""
 
@@ -47,7 +47,7 @@ class MotionEquations:
     # ---- forces ---------------------------------------------------------------------------------
     def contact(self, k: int, contact: Contact) -> None:
         """Call of a contact's geometry: journal relative to bearing, and what the contact exerts on both."""
-        kin, write, geometry = self.kinematics, self.writer, contact.geometry
+        kin, write, is_round = self.kinematics, self.writer, contact.joint.round
         places = contact.journal, contact.bearing
         journal, bearing = map(kin.point, places)
         apart = kin.position(journal) - kin.position(bearing)
@@ -56,10 +56,14 @@ class MotionEquations:
         relative = [write.text(term) for term in (*apart, *moving, *spins)]
         if not (self.on.friction or self.on.waves):  # which are no faster by it
             relative[4:] = ["None" if spin is ZERO else write.text(spin) for spin in spins]
-        frame = self._frame(contact)
+        if is_round:
+            function, frame = "joint_force", self._turns(contact)
+        else:
+            touching = contact.joint.touch(Touching(self, k, contact, apart), contact.part)
+            function, frame = "wall_force", f"({', '.join(map(write.text, touching))})"
         made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
         given = f"joints[{k}], ({', '.join(relative)}), {frame}"
-        call = f"{geometry.function}(effects, work, par, {given}, i, W)"
+        call = f"{function}(effects, work, par, {given}, i, W)"
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
         force = Vector(fx, fy)
@@ -67,22 +71,16 @@ class MotionEquations:
         turning = self.on.friction or self.on.waves
         for place, moment, turned in (
             (contact.journal, on_journal, turning),
-            (contact.bearing, on_bearing, turning or geometry.along_a_line),
+            (contact.bearing, on_bearing, turning or not is_round),
         ):
             body, point = split(place)
             if turned and body != GROUND:
                 self.balance.twists.append(Twist(body, moment, point))
         self.losses.append(loss)
 
-    def _frame(self, contact: Contact) -> str:
-        """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
-        angles of both bodies, which waves around their surfaces turn with."""
+    def _turns(self, contact: Contact) -> str:
+        """Cosines and sines of the angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
-        if contact.geometry.along_a_line:
-            assert contact.joint.kind not in PINS
-            across = self.closing.direction(contact.joint).across()
-            found = [*(across if contact.side > 0.0 else -across)]
-            return f"({', '.join(self.writer.text(term) for term in found)})"
         if not self.on.waves:
             return "None"
         for place in (contact.bearing, contact.journal):
@@ -199,7 +197,7 @@ class MotionEquations:
         n = len(self.columns)
         pins: dict[str, tuple[str, str]] = {}
         for one in self.forest.closures:
-            if one.kind in PINS:
+            if is_pin(one):
                 names = (f"{one.name}_x", f"{one.name}_y")
                 pins |= dict.fromkeys(names, names)
         numbers = {row.name: r for r, row in enumerate(self.constraints, n)}

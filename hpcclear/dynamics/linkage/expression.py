@@ -178,6 +178,15 @@ class Writer:
             self.functions[name := self.fresh(function.__name__)] = function
         return name
 
+    def call(
+        self, function: Callable[..., object], terms: Iterable[Term], results: Iterable[str]
+    ) -> tuple[Term, ...]:
+        """A statement that calls a function; what it returns, by names like these."""
+        texts = [self.text(term) for term in terms]
+        made = [self.fresh(name) for name in results]
+        self.line(f"{', '.join(made)} = {self.called(function)}({', '.join(texts)})")
+        return tuple(map(named, made))
+
     def line(self, text: str) -> None:
         """A statement as it stands; its names must have been written already (see `text`)."""
         self.lines.append(text)

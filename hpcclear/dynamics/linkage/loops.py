@@ -18,7 +18,7 @@ from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import KINDS, Number
+from hpcclear.dynamics.linkage.parts import Number, is_joint
 from hpcclear.dynamics.linkage.trees import forest
 
 WORDS: dict[str, Callable[..., object]] = elements.functions() | {
@@ -93,7 +93,7 @@ class Loops:
         texts: list[str] = []
         places: list[tuple[int, int]] = []
         for one in self.forest.closures:
-            table = "joints" if one.kind in KINDS else "drives"
+            table = "joints" if is_joint(one) else "drives"
             for row in closing.rows(one):
                 r = len(owners)
                 owners.append(f"{table}.{one.name}")

@@ -9,15 +9,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    PINS,
     Body,
     Contact,
     Drive,
     Joint,
     LoadTerms,
     Pair,
-    contacts_of,
     is_loose,
+    is_pin,
     places_of,
     split,
 )
@@ -59,7 +58,11 @@ class Mechanism:
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Their contacts, joint by joint."""
-        return tuple(contact for joint in self.clearances for contact in contacts_of(joint))
+        return tuple(
+            Contact(part, joint, *places)
+            for joint in self.clearances
+            for part, places in joint.contacts().items()
+        )
 
     @property
     def ideal(self) -> tuple[Joint, ...]:
@@ -274,7 +277,7 @@ def massless_angles(m: Mechanism) -> set[str]:
             for body, here, carrier in ((one, point, two), (two, other, one)):
                 if body not in found or carrier in found:
                     continue
-                if joint.kind in PINS:
+                if is_pin(joint):
                     held = tuple(m.body(body).points[here]) != tuple(m.body(body).center)
                 else:
                     held = joint.kind in ("slide", "fixed")
@@ -352,8 +355,7 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {"revolute": 2, "slide": 2, "slot": 1, "fixed": 3}
-    ideal = sum(taken[joint.kind] for joint in m.ideal)
+    ideal = sum(joint.holds for joint in m.ideal)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
 

@@ -9,7 +9,7 @@ from hpcclear.dynamics.linkage import bending
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import PINS, Number, split
+from hpcclear.dynamics.linkage.parts import Number, is_pin, split
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
@@ -25,7 +25,7 @@ def values(
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)
     for joint in mechanism.joints:
-        if joint.kind not in PINS:
+        if not is_pin(joint):
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
         rubs = getattr(joint, "friction", None)

@@ -8,21 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
-
 from hpcclear.base.arrays import Array
-from hpcclear.base.outcome import CORNERS, WALLS
-from hpcclear.dynamics.contacts import guide, pin_in_slot
-from hpcclear.dynamics.contacts.declared import ContactGeometry
-from hpcclear.dynamics.contacts.registry import GEOMETRIES
 
 GROUND = "ground"
 Pair = tuple[float, float]
 Number = float | Array
 """One number, or those of samples (m,)."""
-PINS = ("revolute", "clearance")
-KINDS = (*PINS, "slide", "slot", "fixed")
-"""Of joints."""
 
 
 class TableRow(Protocol):
@@ -89,18 +80,20 @@ class Body:
 
 
 class Contact(NamedTuple):
-    """Where two bodies may touch: a place of the journal's body against one of the bearing's, by a geometry of contact.
+    """Where two bodies may touch: a place of the journal's body against one of the bearing's, by the joint's geometry.
 
-    `name` is the joint's, followed by a dot and a word where the joint has several; `side`: of a contact at a guide's line,
-    1 on its left, -1 on its right.
+    `part` is the word of the contact where the joint has several; else "".
     """
 
-    name: str
+    part: str
     joint: Joint
     journal: str
     bearing: str
-    geometry: ContactGeometry
-    side: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The joint's, followed by a dot and the word where it has several."""
+        return f"{self.joint.name}.{self.part}" if self.part else self.joint.name
 
     @property
     def word(self) -> str:
@@ -108,61 +101,24 @@ class Contact(NamedTuple):
         return self.name.replace(".", "_")
 
 
-def contacts_of(joint: Joint) -> tuple[Contact, ...]:
-    """The contacts of a joint with clearance: of a guide's corners, in the order of `CORNERS`, or a slot's `WALLS`."""
-    geometry = GEOMETRIES[joint.geometry]
-    if joint.kind == "clearance":
-        return (Contact(joint.name, joint, joint.journal, joint.bearing, geometry),)
-    sides = {**WALLS, **{word: side for word, (_, side) in CORNERS.items()}}
-    corner_of = f"{split(joint.point)[0]}.{joint.name}_"
-    return tuple(
-        Contact(
-            f"{joint.name}.{word}", joint,
-            joint.point if joint.kind == "slot" else corner_of + word,
-            joint.line, geometry, sides[word],
-        )
-        for word in joint.corners
-    )  # fmt: skip
-
-
-def start_of(joint: Joint) -> tuple[Number, ...]:
-    """Of a joint with clearance at the start: the journal's eccentricity, m; the offset of a pin in a slot; offset and tilt,
-    rad, of a slider."""
-    if joint.kind == "clearance":
-        return joint.start_eccentricity.x, joint.start_eccentricity.y
-    entries = ("start_offset",) if joint.kind == "slot" else ("start_offset", "start_tilt")
-    given = (getattr(joint, entry) for entry in entries)
-    return tuple(0.0 if one is None else one for one in given)
-
-
-def gaps_of(joint: Joint) -> tuple[Number, ...]:
-    """Of its contacts at the start, m, below 0 in flight."""
-    if joint.kind == "clearance":
-        start = joint.start_eccentricity
-        return (np.hypot(start.x, start.y) - joint.clearance,)
-    module = pin_in_slot if joint.kind == "slot" else guide
-    return tuple(module.gap_of(joint, word, *start_of(joint)) for word in joint.corners)
-
-
-def corners_of(joint: Any, middle: Pair) -> dict[str, Pair]:
-    """Points of a slider that are centres of its corners, `middle` its place in the slider's axes."""
-    size = joint.length, joint.height
-    return {
-        f"{joint.name}_{word}": guide.corner(middle, size, joint.corner_radius, word)
-        for word in CORNERS
-    }
-
-
 def is_loose(joint: Joint) -> bool:
     """Whether a joint has clearance."""
     return getattr(joint, "clearance", None) is not None
 
 
+def is_pin(row: TableRow) -> bool:
+    """Whether a joint or drive is a joint of two points, with no line."""
+    return hasattr(row, "journal")
+
+
+def is_joint(row: TableRow) -> bool:
+    """Whether it is a joint and no drive."""
+    return is_pin(row) or hasattr(row, "line")
+
+
 def places_of(joint: Joint) -> tuple[str, str]:
     """Both places: journal and bearing, or that of the body and that of the one that carries the line."""
-    if joint.kind in PINS:
-        return joint.journal, joint.bearing
-    return joint.point, joint.line
+    return (joint.journal, joint.bearing) if is_pin(joint) else (joint.point, joint.line)
 
 
 def split(place: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.expression import ZERO, Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Number
+from hpcclear.dynamics.linkage.parts import GROUND, Number, is_pin
 from hpcclear.dynamics.linkage.trees import Forest
 
 
@@ -52,7 +52,7 @@ class Poses:
             places = contact.journal, contact.bearing
             journal, bearing = (kin.position(kin.point(place)) for place in places)
             apart = journal - bearing
-            if contact.joint.kind not in PINS:  # the part across the line
+            if not is_pin(contact.joint):  # the part across the line
                 across = Closing(kin, writer).direction(contact.joint).across()
                 apart = across.times(dot(apart, across))
             for axis, part in enumerate(apart):

@@ -15,7 +15,7 @@ from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
 from hpcclear.dynamics.linkage.kinematics import Mover
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Joint, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, Joint, is_pin, places_of, split
 
 PASSES = 4
 """Of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars."""
@@ -211,7 +211,7 @@ class RubbingPin(Rubbing):
 
     def _held(self, closure: Joint) -> list[tuple[str, Vector]]:
         """By constraint of a joint that closes a loop: the force that it takes off what is beyond."""
-        if closure.kind not in (*PINS, "slot"):
+        if not (is_pin(closure) or closure.kind == "slot"):
             return []  # what is left over of trees are pins and slots
         first, second = (split(place)[0] in self.beyond for place in places_of(closure))
         if first == second:
@@ -240,7 +240,7 @@ def rubbing_of(of: Solving) -> list[Rubbing]:
             continue
         if joint.kind == "slide":
             found.append(RubbingGuide(joint, of))
-        elif joint.kind in PINS:
+        elif is_pin(joint):
             pin = RubbingPin(joint, of)
             found += [pin] if pin.turns else []
     return found

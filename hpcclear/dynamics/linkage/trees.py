@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, PINS, Drive, Joint, TableRow, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, Drive, Joint, TableRow, is_pin, places_of, split
 
 
 class Coordinate(NamedTuple):
@@ -75,9 +75,7 @@ class Forest:
         hang = self.hangs[body]
         if self.mechanism.body(body).bending is not None:
             return False
-        return (
-            hang.joint is not None and hang.joint.kind in PINS and split(hang.parent)[0] == GROUND
-        )
+        return hang.joint is not None and is_pin(hang.joint) and split(hang.parent)[0] == GROUND
 
 
 def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) -> Forest:

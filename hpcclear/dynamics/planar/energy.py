@@ -28,15 +28,15 @@ def energies(
     kinetic, potential, eccentricity = linkage.energies(par, q, v, turn_time, scene.effects.gravity)
     p = Parameters(par)
     contacts = linkage.mechanism.contacts
-    reach = p.clearance[..., places]
+    gaps = np.empty((len(eccentricity.T), len(contacts)))
     for k, contact in enumerate(contacts):
-        reach[..., k] = contact.geometry.reach(p, places[k])
-    gaps = np.hypot(eccentricity[:, 0], eccentricity[:, 1]).T - reach
+        sizes = (one[..., places[k]] for one in (p.clearance, p.bearing_radius, p.journal_radius))
+        gaps[:, k] = contact.joint.gap(contact.part, eccentricity[k], *sizes)
     if any(scene.waves().values()):
         pose = linkage.poses.at(par, q, v, turn_time)[0]
         angles = {body.name: pose.angle[k] for k, body in enumerate(linkage.mechanism.bodies)}
         for k, contact in enumerate(contacts):
-            if contact.geometry.along_a_line:
+            if not contact.joint.round:
                 continue
             bodies = [split(place)[0] for place in (contact.bearing, contact.journal)]
             turns = tuple(angles.get(body, 0.0) for body in bodies)

@@ -21,7 +21,7 @@ from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import Walk, changes, passage, refused
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import PlanarSlide, turns_of
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Numbers, Points
 
 PLACEHOLDER = 1e-3
@@ -105,7 +105,7 @@ def guided(mechanism: Mechanism) -> str:
     held = [
         split(joint.point)[0]
         for joint in mechanism.joints
-        if isinstance(joint, PlanarSlide) and split(joint.line)[0] == GROUND
+        if joint.kind == "slide" and split(joint.line)[0] == GROUND
     ]
     return next((body.name for body in mechanism.bodies if body.name in held), "")
 

@@ -17,7 +17,7 @@ from hpcclear.dynamics.planar.energy import stored_energy
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
-from hpcclear.scene.joints import OfContacts
+from hpcclear.scene.contacts.declared import AlongLine
 from hpcclear.scene.planar import PlanarRevolute, turns_of
 
 
@@ -175,7 +175,7 @@ def balance_series(
 
 def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
-    guides = [joint for joint in mechanism.clearances if isinstance(joint, OfContacts)]
+    guides = [joint for joint in mechanism.clearances if isinstance(joint, AlongLine)]
     if not guides:
         return {}
     found = []

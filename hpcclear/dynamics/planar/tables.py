@@ -6,9 +6,9 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import at
 from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
-from hpcclear.dynamics.linkage.parts import Body, corners_of, split
+from hpcclear.dynamics.linkage.parts import Body, places_of, split
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import Planar, PlanarBody, PlanarJoint, PlanarSlide, is_loose, turns_of
+from hpcclear.scene.planar import Planar, PlanarBody, PlanarJoint, is_loose, turns_of
 from hpcclear.scene.points import Points
 
 
@@ -52,10 +52,10 @@ def _body(body: PlanarBody, joints: tuple[PlanarJoint, ...]) -> Body:
     """A body; one that slides in channels wider than itself has the centres of its corners as points."""
     points = body.own_points
     for joint in joints:
-        if is_loose(joint) and isinstance(joint, PlanarSlide):
-            own, point = split(joint.point)
+        if is_loose(joint):
+            own, point = split(places_of(joint)[0])
             if own == body.name and point in points:
-                points |= corners_of(joint, points[point])
+                points |= joint.further_points(points[point])
     mass = body.mass, body.own_inertia, body.own_center
     return Body(body.name, *mass, points, body.start_angle, body.bending)
 

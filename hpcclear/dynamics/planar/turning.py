@@ -15,11 +15,10 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, ideal_rows, smallest_value
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import Joint
+from hpcclear.dynamics.linkage.parts import Joint, is_loose
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
 from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
 from hpcclear.scene.driving import FreeDriving, PlanarSpeed
-from hpcclear.scene.planar import PlanarClearance, PlanarRevolute, is_loose
 
 DEPENDENT = 1e-3
 """Smallest singular value of the ideal joints' constraints, rows scaled to 1, at which they depend on one another at a change
@@ -53,15 +52,8 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
-    joints: list[Any] = list(mechanism.joints)
-    for k, joint in enumerate(mechanism.joints):
-        if isinstance(joint, PlanarClearance):
-            joints[k] = PlanarRevolute.model_construct(
-                name=joint.name, kind="revolute", journal=joint.journal, bearing=joint.bearing
-            )
-        elif is_loose(joint):
-            joints[k] = joint.model_copy(update={"clearance": None})
-    return tuple(joints)
+    joints = (joint.ideal() if is_loose(joint) else joint for joint in mechanism.joints)
+    return tuple(joint for joint in joints if joint is not None)
 
 
 def _by_torque(mechanism: Mechanism) -> bool:

@@ -7,8 +7,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import WIDEST
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.declared import Shape
-from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.planar.prescribed import held_extremes
 from hpcclear.dynamics.planar.problem import is_prescribed, parameters_of
@@ -18,7 +16,7 @@ from hpcclear.laws import laws, numbers
 from hpcclear.laws.constant import with_constants
 from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.scene import Scene
-from hpcclear.scene.joints import length_path
+from hpcclear.scene.contacts.declared import Shape
 from hpcclear.scene.points import Numbers, Points
 
 HERTZ_RANGE = 0.25
@@ -57,8 +55,9 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
 
 def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
     """Numbers of a contact's shape."""
-    key, geometry = scene.joint_key(label), GEOMETRIES[scene.clearance_joint(label).geometry]
-    return geometry.shape(lambda name: get(f"{key}.{name}"))
+    key, joint = scene.joint_key(label), scene.clearance_joint(label)
+    shape: Shape = joint.shape(lambda name: get(f"{key}.{name}"))
+    return shape
 
 
 def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
@@ -73,7 +72,7 @@ def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
     )
     h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
     alpha, beta = dundurs(moduli, ratios)
-    path = length_path(scene.clearance_joint(label))
+    path = scene.clearance_joint(label).length_path
     return {
         "stiffness": sphere_stiffness(h_bearing, h_journal, shape.radius),
         "compliance": h_bearing + h_journal,
@@ -116,7 +115,7 @@ def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None
         p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
     else:
         p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
-    if GEOMETRIES[scene.clearance_joint(label).geometry].along_a_line:  # a corner is small
+    if not scene.clearance_joint(label).round:  # a corner is small
         p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
     rubs = scene.effects.friction
     if rubs.law == "none":

@@ -12,7 +12,6 @@ from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, uncentred, with_numbers
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import gaps_of
 from hpcclear.dynamics.linkage.passage import clear
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import Forest
@@ -158,7 +157,7 @@ def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Star
     law = scene.effects.contact
     if law is None or not law.latched:
         return
-    gaps = [gap for joint in sample_of(scene, points).clearances for gap in gaps_of(joint)]
+    gaps = [gap for joint in sample_of(scene, points).clearances for gap in joint.gaps()]
     for k, gap in zip(scene.open_places, gaps, strict=True):
         touching = np.asarray(gap) >= 0.0
         start.active[:, k] = touching

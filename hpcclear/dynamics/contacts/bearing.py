@@ -6,11 +6,9 @@ forces exerts no net couple; angles counter-clockwise; gravity towards -y.
 
 import math
 
-from hpcclear.base.arrays import Array
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.declared import ContactGeometry, Get, Shape
 from hpcclear.dynamics.contacts.forces import (
     lost,
     normal_force,
@@ -21,7 +19,6 @@ from hpcclear.dynamics.contacts.forces import (
 )
 from hpcclear.dynamics.contacts.lubrication import film_of, pressed
 from hpcclear.dynamics.contacts.roundness import less, store_angles, tilted, waves_here
-from hpcclear.dynamics.layout.views import Parameters
 
 _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
 
@@ -80,29 +77,3 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
         oil[3] - moment_journal + side[3],
         loss + oil[4],
     )
-
-
-def shape(get: Get) -> Shape:
-    """Numbers of a joint's samples.
-
-    Paper eq. 4 as printed lacks R_J in the stiffness and is not dimensionally consistent; this is the form of the cited
-    source, Lankarani and Nikravesh 1990 (doi:10.1115/1.2912617), for internal contact of spheres.
-    """
-    clearance, bearing = get("clearance"), get("bearing_radius")
-    journal = bearing - clearance
-    radii = (clearance, bearing, journal)
-    return Shape(*radii, radii, bearing * journal / clearance)
-
-
-def reach(parameters: Parameters, place: int) -> Array:
-    """The clearance, m, shape (...): of samples."""
-    return parameters.clearance[..., place]
-
-
-GEOMETRY = ContactGeometry(
-    name="pin_in_bearing",
-    words="journal in a round bearing",
-    force=joint_force,
-    shape=shape,
-    reach=reach,
-)
