@@ -43,7 +43,7 @@ FEATURES = {
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
         "report/scatter.py",
     "fits of ISO 286, catalogues, costs":
-        "scene/fits.py scene/fitted.py scene/choices.py scene/joints.py "
+        "scene/fits.py scene/fitted.py scene/choices.py scene/contacts/pin_in_bearing.py "
         "report/html/designs.py",
     "oil films":
         "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/surfaces.py "
@@ -51,7 +51,7 @@ FEATURES = {
     "bars that bend":
         "dynamics/linkage/bending.py scene/planar.py dynamics/planar/tolerances.py dynamics/bending.py",
     "guides with clearance, friction of other joints":
-        "dynamics/contacts/guide.py scene/joints.py dynamics/linkage/rubbing.py "
+        "dynamics/contacts/wall.py scene/contacts/guide.py dynamics/linkage/rubbing.py "
         "dynamics/linkage/guides.py report/figures/guides.py scene/study_tables.py",
     "shapes of contact, roundness":
         "laws/geometry/* dynamics/contacts/roundness.py scene/surfaces.py",

@@ -18,7 +18,7 @@ from types import CodeType, FrameType
 ROOT = Path(__file__).parent.parent / "hpcclear"
 STATIONS = (
     "base/units.py:to_si",
-    "scene/joints.py:Bearing._check",
+    "scene/contacts/pin_in_bearing.py:PinInBearing._check",
     "scene/sampling.py:latin_hypercube",
     "scene/sampling.py:check_points",
     "dynamics/setup/parameters.py:fill",
@@ -34,14 +34,14 @@ ELSEWHERE = {
     "scene/random_inputs.py": "bounds of a distribution, not of the clearance",
     "dynamics/setup/problem.py": "the scene's own design, by which a method is chosen",
     "ensemble/simulate.py": "every rank makes the same scene once more, and compiles without samples",
-    "ensemble/session.py": "times of the run, and the mark that it is done",
+    "cli/printing.py": "units of the summary that is printed",
     "report/spread.py": "reads the scene of the finished file for a line of the summary",
 }
 """Files that make such calls about something else."""
 
 KERNEL = (
     "dynamics/stepping/explicit/stepper.py",
-    "dynamics/contacts/pin_in_bearing.py",
+    "dynamics/contacts/bearing.py",
     "dynamics/stepping/sample.py",
 )
 """Files of the way whose functions are compiled."""

@@ -3,9 +3,9 @@
 A failed simulation is an outcome, not an exception: its numbers are NaN and its status says why.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -148,61 +148,87 @@ class Field(NamedTuple):
     """Whether every file with the outcome of a simulation has it."""
     goal: str = ""
     """What a study makes small by it, in words (`hpcclear.base.objectives.OURS`); "" for no objective."""
+    of: Callable[[Any], Any] | None = None
+    """Its values from what the kernel averaged: of a `hpcclear.dynamics.layout.views.Outcome`, or of the revolutions of one
+    response, whose ``in_revolution("NAME")`` is an integral over a revolution. None where it is filled in later."""
 
+
+def _about_mean(o: Any) -> Any:
+    mean_square = (o.frame_force**2).sum(axis=1)
+    return np.sqrt(np.maximum(o.square_frame_force - mean_square, 0.0))
+
+
+_IMPACTS = {
+    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact",
+        goal="number of impacts in a revolution",
+        of=lambda o: o.in_revolution("begun")),
+    "impact_energy": Field("J", "energy lost by damping of the contact in a revolution", per="joint", when="impact",
+        goal="energy lost in impacts in a revolution, of all joints",
+        of=lambda o: o.in_revolution("impact_power")),
+    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact",
+        goal="impulse of the contact force in a revolution",
+        of=lambda o: o.in_revolution("mean_force")),
+    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact",
+        goal="angle of the drive without contact in a revolution",
+        of=lambda o: o.flight * o.cycle[:, None]),
+    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact",
+        goal="root mean square of the contact force",
+        of=lambda o: np.sqrt(np.maximum(o.square_force, 0.0))),
+    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact",
+        goal="root mean square about its mean of the force on the frame",
+        of=_about_mean),
+}  # fmt: skip
+"""Measures of impact and noise; angles without contact go by time."""
+
+_LEVELS = {
+    "frame_force_level": Field(
+        "1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"
+    ),
+    "contact_force_level": Field(
+        "1", "third-octave level of the contact force, dB re 1e-6 N", per="joint band", when="level"
+    ),
+}
 
 FIELDS = {
     "sample": Field("1", "number of the sample in the design", "i8"),  # -1 never leaves the evaluator
-    "objective": Field("objective", "objective f, mean gap between journal and bearing", required=True),  # eq. 13
-    "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True),
+    "objective": Field("objective", "objective f, mean gap between journal and bearing", required=True,
+        of=lambda o: o.objective),  # eq. 13
+    "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True,
+        of=lambda o: o.spread),
     "objective_uncertainty": Field("objective", "half-width of f, by replicas or of its steady mean"),
-    "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint"),
+    "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint", of=lambda o: o.mean_gap),
     "peak_contact_force": Field("N", "largest contact force over the averaged revolutions", per="joint",
-        goal="peak contact force"),
+        goal="peak contact force", of=lambda o: o.peak_force),
     "mean_contact_force": Field("N", "mean contact force over the averaged revolutions", per="joint", when="response",
-        goal="mean contact force"),
+        goal="mean contact force", of=lambda o: o.mean_force),
     "peak_crank_moment": Field("N m", "largest absolute torque of the drive on the crank", when="response",
-        goal="peak torque of the drive on the crank"),
+        goal="peak torque of the drive on the crank", of=lambda o: o.peak_moment),
     "slider_acceleration_deviation": Field("m/s^2", "standard deviation of the slider acceleration in time", when="response",
-        goal="standard deviation in time of the slider acceleration"),
+        goal="standard deviation in time of the slider acceleration", of=lambda o: o.acceleration_deviation),
     "point_acceleration_deviation": Field(
         "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response",
-        goal="root mean square about its mean of the acceleration of the followed point"),
+        goal="root mean square about its mean of the acceleration of the followed point",
+        of=lambda o: o.acceleration_deviation),
     "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response",
-        goal="largest acceleration of the followed point"),
-    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact",
-        goal="number of impacts in a revolution"),
-    "impact_energy": Field("J", "energy lost by damping of the contact in a revolution", per="joint", when="impact",
-        goal="energy lost in impacts in a revolution, of all joints"),
-    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact",
-        goal="impulse of the contact force in a revolution"),
-    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact",
-        goal="angle of the drive without contact in a revolution"),
-    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact",
-        goal="root mean square of the contact force"),
-    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact",
-        goal="root mean square about its mean of the force on the frame"),
+        goal="largest acceleration of the followed point", of=lambda o: o.peak_acceleration),
+    **_IMPACTS,
     "band": Field("Hz", "middle of the third-octave band", per="band", when="level"),
-    "frame_force_level": Field(
-        "1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"),
-    "contact_force_level": Field(
-        "1", "third-octave level of the contact force, dB re 1e-6 N", per="joint band", when="level"),
+    **_LEVELS,
     **{
         f"{name}_limit": Field(
-            unit, f"half-width of the 95 % confidence interval of {name}", per=per, when="level")
-        for name, unit, per in (
-            ("frame_force_level", "1", "band"), ("contact_force_level", "1", "joint band"),
-            ("impacts", "1", "joint"), ("impact_energy", "J", "joint"), ("contact_impulse", "N s", "joint"),
-            ("contact_loss", "rad", "joint"), ("rms_contact_force", "N", "joint"), ("rms_frame_force", "N", ""),
-        )
+            one.unit, f"half-width of the 95 % confidence interval of {name}", per=one.per, when="level")
+        for name, one in (_LEVELS | _IMPACTS).items()
     },
     "peak_contact_pressure": Field("Pa", "largest pressure at the peak contact force", per="joint", when="pressure",
         goal="peak contact pressure"),
     "contact_half_angle": Field("rad", "half of the angle of contact at the peak contact force", per="joint", when="pressure",
         goal="half angle of contact at the peak force"),
     "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="rate"),
-    "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="wear"),
+    "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="wear",
+        of=lambda o: o.sliding_power * o.revolution[:, None]),
     "sliding_waves": Field(
-        "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="wear"),
+        "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="wear",
+        of=lambda o: o.profile * o.revolution[:, None]),
     "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="energy"),
     "objective_limit": Field(
         "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),

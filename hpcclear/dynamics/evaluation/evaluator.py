@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
-from hpcclear.base.outcome import IMPACTS, RESPONSES, Flag, Status, unknown
+from hpcclear.base.outcome import FIELDS, IMPACTS, RESPONSES, Flag, Status, unknown
 from hpcclear.base.width import doubles_in_a_vector
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
@@ -281,19 +281,14 @@ def outcome_records(
     records["rhs_evaluations"] = outcome.evaluations
     valid = np.isin(records["status"], [status for status in Status if status.valid])
     known = {
-        "objective": outcome.objective, "objective_spread": outcome.spread,
-        "mean_gap": outcome.mean_gap, "peak_contact_force": outcome.peak_force,
-    }  # fmt: skip
-    made = {**_responses(outcome), **measures(outcome)}
-    known |= {name: one for name, one in made.items() if name in responses}
-    if "sliding_work" in (record.names or ()):
-        known |= {
-            "sliding_work": outcome.sliding_power * _revolution(outcome),
-            "sliding_waves": outcome.profile * _revolution(outcome),
-        }
+        name: one.of(outcome)
+        for name, one in FIELDS.items()
+        if one.of and name in (record.names or ())
+        if name in responses or one.when not in ("response", "impact")
+    }
     if objective.rate is not None:
         largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
-        known[RATE] = objective.made_of(outcome.mean_rate, largest, _revolution(outcome))
+        known[RATE] = objective.made_of(outcome.mean_rate, largest, outcome.revolution[:, None])
     for name, values in known.items():
         there: Any = (valid, *map(slice, record[name].shape))
         records[name][valid] = values[there]
@@ -305,35 +300,3 @@ def outcome_records(
     flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)
     records["flags"] = np.where(valid, flags, 0)
     return records
-
-
-def _responses(outcome: Outcome) -> dict[str, Array]:
-    """Values of `RESPONSES`."""
-    scatter = outcome.acceleration_deviation
-    return {
-        "mean_contact_force": outcome.mean_force, "peak_crank_moment": outcome.peak_moment,
-        "slider_acceleration_deviation": scatter, "point_acceleration_deviation": scatter,
-        "peak_point_acceleration": outcome.peak_acceleration,
-    }  # fmt: skip
-
-
-def measures(outcome: Outcome) -> dict[str, Array]:
-    """Measures of impact and noise (`IMPACTS`) over the averaged revolutions, shape (m, MAX_JOINTS) or (m,).
-
-    Angles without contact go by time.
-    """
-    period = outcome.period[:, None]
-    mean_square = (outcome.frame_force**2).sum(axis=1)
-    return {
-        "impacts": outcome.begun * period,
-        "impact_energy": outcome.impact_power * period,
-        "contact_impulse": outcome.mean_force * period,
-        "contact_loss": outcome.flight * outcome.cycle[:, None],
-        "rms_contact_force": np.sqrt(np.maximum(outcome.square_force, 0.0)),
-        "rms_frame_force": np.sqrt(np.maximum(outcome.square_frame_force - mean_square, 0.0)),
-    }
-
-
-def _revolution(outcome: Outcome) -> Array:
-    """How long one lasts, s, (m, 1)."""
-    return (outcome.time / outcome.revolutions)[:, None]

@@ -20,7 +20,7 @@ class Column:
     """`size` columns of a view's rows, every `step`-th; of the class itself the number of the first, as the kernel has it."""
 
     def __init__(self, first: int, size: int = 1, step: int = 1) -> None:
-        self.first = first
+        self.first, self.size = first, size
         self.column = first if size == 1 else slice(first, first + step * size, step)
 
     @overload
@@ -172,6 +172,16 @@ class Outcome(View):
     absolute_drive_work = Column(drive_work.first + 1)
     dissipated = Column(drive_work.first + 2)
     load_work = Column(drive_work.first + 3)
+
+    @property
+    def revolution(self) -> Array:
+        """How long one of all revolutions lasts, s, (m,)."""
+        return self.time / self.revolutions
+
+    def in_revolution(self, name: str) -> Array:
+        """Integral of a rate, by the name of its mean, over an averaged revolution."""
+        mean: Array = getattr(self, name)
+        return mean * self.period[:, None]
 
     def coordinates(self, n: int) -> Array:
         """The n coordinates of a topology at the end, shape (..., n)."""

@@ -59,7 +59,7 @@ class MotionEquations:
         if is_round:
             function, frame = "joint_force", self._turns(contact)
         else:
-            touching = contact.joint.touch(Touching(self, k, contact, apart), contact.part)
+            touching = contact.joint.touch(Touching(self.closing, k, contact, apart), contact.part)
             function, frame = "wall_force", f"({', '.join(map(write.text, touching))})"
         made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
         given = f"joints[{k}], ({', '.join(relative)}), {frame}"

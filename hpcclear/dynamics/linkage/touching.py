@@ -1,14 +1,11 @@
 """What a geometry of contact may use of the motion that it is written into (`hpcclear.scene.contacts`)."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.closing import Closing
 from hpcclear.dynamics.linkage.expression import Term, Vector, named
 from hpcclear.dynamics.linkage.parts import Contact
-
-if TYPE_CHECKING:
-    from hpcclear.dynamics.linkage.equations import MotionEquations
 
 
 class Touching:
@@ -17,13 +14,13 @@ class Touching:
     `apart`: position of the journal's place relative to the bearing's, m.
     """
 
-    def __init__(self, of: "MotionEquations", k: int, contact: Contact, apart: Vector) -> None:
-        self._of, self._k, self._contact, self.apart = of, k, contact, apart
+    def __init__(self, closing: Closing, k: int, contact: Contact, apart: Vector) -> None:
+        self._closing, self._k, self._contact, self.apart = closing, k, contact, apart
 
     @property
     def across(self) -> Vector:
         """Unit vector to the left of the joint's line."""
-        return self._of.closing.direction(self._contact.joint).across()
+        return self._closing.direction(self._contact.joint).across()
 
     @property
     def clearance(self) -> Term:
@@ -48,4 +45,4 @@ class Touching:
     ) -> tuple[Term, ...]:
         """What a function of numbers returns, by names: one without branches, of arithmetic, ``abs`` and ``np.sqrt``."""
         names = [f"{name}_{self._contact.word}" for name in results]
-        return self._of.writer.call(function, terms, names)
+        return self._closing.writer.call(function, terms, names)

@@ -1,12 +1,15 @@
 """Measures of impact and noise of one response: by revolution, and means with confidence intervals."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import FIELDS, IMPACTS
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.recorded.steps import Steps
+from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
@@ -64,48 +67,48 @@ class Turns:
         return np.diff(times), np.diff(np.array([one for _, one in ends]), axis=0)
 
 
-def by_revolution(
-    periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
-) -> dict[str, Array]:
-    """Measures of each revolution, (r, joints) or (r,), by the names of `hpcclear.base.outcome.IMPACTS`.
+class Revolutions:
+    """Means over each revolution by the names of `Outcome`, (r, joints) or (r,), as formulas of `FIELDS` read them.
 
-    Lengths (r,) and integrals (r, measures) of revolutions, the angle in rad of one, and how many joints there are. The force
-    on the frame is left out where bodies are not `rigid`.
+    Lengths (r,) and integrals (r, measures) of revolutions, the angle in rad of one, and how many joints there are.
     """
-    mean = integrals / periods[:, None]
 
-    def of(row: int) -> Array:
-        return np.asarray(integrals[:, _columns(row, joints)])
+    def __init__(self, periods: Array, integrals: Array, cycle: float, joints: int) -> None:
+        self.period, self.cycle = periods, np.full(len(periods), cycle)
+        self._integrals, self._joints = integrals, joints
 
-    found = {
-        "impacts": of(at.BEGUN),
-        "impact_energy": of(at.IMPACT_POWERS),
-        "contact_impulse": of(at.FORCE),
-        "contact_loss": of(at.FLIGHTS) / periods[:, None] * cycle,
-        "rms_contact_force": np.sqrt(np.maximum(mean[:, _columns(at.FORCE_SQUARES, joints)], 0.0)),
-    }
-    if rigid:
-        frame = mean[:, _columns(at.FRAME_X, 2)]
-        square = mean[:, _columns(at.FRAME_SQUARE, 1)][:, 0] - (frame**2).sum(axis=1)
-        found["rms_frame_force"] = np.sqrt(np.maximum(square, 0.0))
-    return found
+    def in_revolution(self, name: str) -> Array:
+        """Integral of a rate over each revolution."""
+        column = vars(Outcome)[name]
+        rate = at.INTEGRATED[column.first - Outcome.mean].rate
+        size = self._joints if column.size == at.MAX_JOINTS else column.size
+        found: Array = self._integrals[:, _columns(rate, size)]
+        return found[:, 0] if column.size == 1 else found
+
+    def __getattr__(self, name: str) -> Array:
+        found = self.in_revolution(name)
+        return found / (self.period if found.ndim == 1 else self.period[:, None])
 
 
 def measured_of(
     scene: Scene, problem: Problem, periods: Array, integrals: Array
 ) -> dict[str, Array]:
-    """What `by_revolution` gives as the file has it: of each revolution (r, joints), of all of them (joints,), and half-widths.
+    """Measures of impact and noise as the file has them: of each revolution (r, joints), of all of them (joints,), and
+    half-widths.
 
-    Lengths (r,) and integrals (r, measures) of revolutions.
+    Lengths (r,) and integrals (r, measures) of revolutions. The force on the frame is left out where bodies bend.
     """
     cycle, joints = abs(problem.cycle) or at.TURN, len(scene.joint_labels)
-    rigid = not scene.modes
-    each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
+    each = Revolutions(periods, integrals, cycle, joints)
     means = periods.mean(keepdims=True), integrals.mean(axis=0, keepdims=True)
-    together = by_revolution(*means, cycle, joints, rigid=rigid)
+    together = Revolutions(*means, cycle, joints)
     result = {}
-    for name, values in each.items():
+    for name in IMPACTS:
+        if scene.modes and name == "rms_frame_force":
+            continue
+        formula: Any = FIELDS[name].of
+        values = formula(each)
         result[f"{name}_by_revolution"] = values
-        result[name] = together[name][0]
+        result[name] = formula(together)[0]
         result[f"{name}_limit"] = spectra.half_width(values)
     return result
