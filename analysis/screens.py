@@ -36,6 +36,7 @@ MADE = {
     "identification": [
         *("identify", JOBS / "identify.toml", "--signal", "january.csv", "--signal", "march.csv"),
         *("--unknown", "joints.crank_rod.clearance=10um:150um"),
+        *("--date", "2026-01-10", "--date", "2026-03-12", "--limit", "100um"),
     ],
 }
 """Commands, without where they write."""

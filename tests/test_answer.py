@@ -81,9 +81,9 @@ def test_the_same_design_under_other_names_is_no_choice():
 @pytest.mark.parametrize(
     ("total", "error", "words"),
     [
-        ((0.59, 2e-4, 0.4), 1e-4, "m2 59.0% ± 0.1%, m3 40.0% ± 0.1%, C below 0.5%"),
-        ((2e-4, 2e-4, 1.0), 1e-4, "m3 100.0% ± 0.1%, m2, C below 0.5%"),
-        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2%, m3 40% ± 2%, C below 2.0%"),
+        ((0.59, 2e-4, 0.4), 1e-4, "m2 59.0 ± 0.1 %, m3 40.0 ± 0.1 %, C below 0.5 %"),
+        ((2e-4, 2e-4, 1.0), 1e-4, "m3 100.0 ± 0.1 %, m2, C below 0.5 %"),
+        ((0.59, 2e-4, 0.4), 0.01, "m2 59 ± 2 %, m3 40 ± 2 %, C below 2.0 %"),
         ((0.59, np.nan, 0.4), 0.01, None),
     ],
 )

@@ -93,9 +93,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     assert shares == (0.55, 0.3, 0.001)
     assert halves == pytest.approx([1.96 * error for error in (0.01, 0.02, 0.004)])
     (tolerances,) = scatter.lines(Recommended({"contributions": content}, best, best))
-    listed = (
-        "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%. The cubic fit does not explain 15%"
-    )
+    listed = "C 25 ± 2 %, m2 10 ± 2 %, m3 2.0 ± 1.0 %, u2 below 0.5 %. The cubic fit does not explain 15 %"
     assert listed in tolerances.text
     assert "other" not in tolerances.text
     assert list(scatter.lines(Recommended({}, best, best))) == []

@@ -354,6 +354,7 @@ def test_growth_has_a_rate_and_a_time_to_the_limit_with_intervals():
     shrinking = history(times, particles[::-1], 100e-6, rng)
     assert np.isinf(shrinking.time[1, 0])
     assert history(times[:1], particles[:1], None, rng) is None
+    assert history(seconds_of((), 3), particles, None, rng) is None  # no date, no rate
 
 
 @pytest.mark.parametrize(
@@ -363,6 +364,14 @@ def test_growth_has_a_rate_and_a_time_to_the_limit_with_intervals():
 def test_dates_that_are_none_are_refused(dates, reason):
     with pytest.raises(InputError, match=reason):
         seconds_of(dates, 2)
+
+
+@pytest.mark.parametrize("dates", [(), ("2026-01-01",)])
+def test_a_limit_without_dates_is_refused_before_anything_is_simulated(tmp_path, scene, dates):
+    words = {"signal": [SCENE] * max(len(dates), 1), "date": dates, "limit": "100 um"}
+    with pytest.raises(InputError, match="two dates"):
+        hpcclear.identify(scene, UNKNOWN, output=tmp_path / "identify.nc", **words)
+    assert not list(tmp_path.iterdir())
 
 
 def record(path: Path, noise: float, samples: int, change: float, form: str, seed: int) -> Path:
@@ -393,7 +402,10 @@ def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkey
     }
 
     def judge(*names):
-        return hpcclear.identify(bare, UNKNOWN, [files[name] for name in names], progress="quiet")
+        dates = [f"2026-01-{k}" for k in range(10, 10 + len(names))]
+        return hpcclear.identify(
+            bare, UNKNOWN, [files[name] for name in names], date=dates, progress="quiet"
+        )
 
     alone = [judge(name) for name in ("good", "other machine")]
     company = judge(*kinds)

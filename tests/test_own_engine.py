@@ -96,7 +96,7 @@ def test_the_objective_asked_for_is_what_sample_evaluate_and_simulate_call_objec
         ("drive.speed=5000", ["drive.speed = 5000 rad/s is 47746 rpm", '"5000 rpm"']),
         ("joints.crank_rod.bearing.youngs_modulus=0.5", ["= 0.5 Pa is softer than rubber", "GPa"]),
         ("joints.rod_slider.journal.youngs_modulus=210e12", ["stiffer than diamond", "GPa"]),
-        ("joints.rod_slider.clearance=0.003", ["27% of the bearing's radius", "radial clearance"]),
+        ("joints.rod_slider.clearance=0.003", ["27 % of the bearing's radius", "radial clearance"]),
         ("mechanism.slider.mass=400", ["mechanism.slider.mass = 400 kg", '"400 g"']),
         ("mechanism.rod.length=140", ["mechanism.rod.length = 140 m", '"140 mm"']),
         ("mechanism.rod.inertia=1100", ["mechanism.rod.inertia = 1100 kg m2", "check the unit"]),

@@ -50,7 +50,7 @@ def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
     file, loose, strict = found.rows
     assert file.scene == SCENE
     for row in (loose, strict):
-        limit = re.match(r"half-width (\S+), met by 100%", row.reached).group(1)
+        limit = re.match(r"half-width (\S+), met by 100 %", row.reached).group(1)
         assert float(limit) <= row.error
     assert file.reached == ""
     assert found.samples == SCENE.study.samples

@@ -18,12 +18,10 @@ def with_case(scene: Scene) -> tuple[Scene, str, str]:
         case = scene.study.cases[-1].name
         return _by_quadrature(scene), case, f"the scene's study, case {case}"
     if scene.study is not None:
-        where = (
-            f"the scene's study, inputs uniform within {SHARE:.0%} of their range about a design"
-        )
+        where = f"the scene's study, inputs uniform within {100 * SHARE:.0f} % of their range about a design"
     else:
         scene = scene.with_({"study": {"seed": 1, "variables": _variables(scene)}})
-        where = f"no study in the scene: variables within {WIDTH:.0%} of its values"
+        where = f"no study in the scene: variables within {100 * WIDTH:.0f} % of its values"
     assert scene.study is not None
     names = scene.study.optimisation
     widths = {

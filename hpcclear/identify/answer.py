@@ -51,7 +51,9 @@ def run_identify(
         raise InputError("--signal", "", "there is nothing to identify from", remedy)
     times = seconds_of(settings.dates, len(settings.signals)) if settings.signals else np.zeros(0)
     inputs = Inputs.of(scene, settings.unknowns)
-    settings.limit_in(inputs.unknowns[0].unit)  # refuses before anything is simulated
+    if settings.limit_in(inputs.unknowns[0].unit) is not None and len(settings.dates) < 2:
+        reason = "the time to it needs signals of two dates or more"
+        raise InputError("--limit", str(settings.limit), reason, "Give --date for each --signal")
     place = Place.of_file(output, options.fresh)
     with Session(
         place, {**run_key(scene, "identify"), **settings.key()}, ranks, options

@@ -20,12 +20,12 @@ class History(NamedTuple):
 
 
 def seconds_of(dates: tuple[str, ...], count: int) -> Array:
-    """Return the times (count,) of measurements, s after the first; 0, 1 day, ... without dates.
+    """Return the times (count,) of measurements, s after the first; NaN without dates.
 
     Raises InputError: a date is none, there are too few, or they do not rise.
     """
     if not dates:
-        return DAY * np.arange(float(count))
+        return np.full(count, np.nan)
     if len(dates) != count:
         reason = f"there are {count} signals and {len(dates)} dates"
         raise InputError("--date", ", ".join(dates), reason, "Give one date for each signal")
@@ -45,7 +45,7 @@ def history(
     times: Array, particles: Array, limit: float | None, rng: np.random.Generator,
     explained: Booleans | None = None,
 ) -> History | None:  # fmt: skip
-    """Rate of growth, by least squares through posteriors (m, n, unknowns) at times (m,), s; None for fewer than two dates.
+    """Rate of growth, by least squares through posteriors (m, n, unknowns) at times (m,), s; None for fewer or unknown.
 
     They are paired by chance: what the dates have in common makes the interval wider than need be. `limit`: SI; without it
     times are NaN. `explained` (m,): records that count, since the posterior of a record that the model does not explain is not
@@ -54,7 +54,7 @@ def history(
     last = times[-1]
     if explained is not None:
         times, particles = times[explained], particles[explained]
-    if len(times) < 2:
+    if len(times) < 2 or np.isnan(times).any():
         return None
     drawn = np.stack([rng.permuted(one, axis=0) for one in particles])
     spread = np.maximum(particles.var(axis=1), 1e-300)  # (m, unknowns)

@@ -31,7 +31,7 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
     if not names:
         return ""
     together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
-    text = f"{_listed(names)}: criterion within {FLAT:.0%} of the recommended design"
+    text = f"{_listed(names)}: criterion within {100 * FLAT:.0f} % of the recommended design"
     if found := spans(ours, best, names):
         text += f"; they differ in {found}"
     return text + _lightest(together, best)

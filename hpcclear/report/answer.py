@@ -80,7 +80,7 @@ def confidence(best: Results) -> str:
             if paired
             else "sampling error only"
         )
-        text += f"; {level:.0%} confidence intervals, which cover {covered}"
+        text += f"; {100 * level:.0f} % confidence intervals, which cover {covered}"
     return text
 
 

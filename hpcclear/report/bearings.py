@@ -206,7 +206,7 @@ def sensitive_words(relative: float, content: Results) -> str:
         remedy = "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
     return (
         "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is "
-        f"{relative:.0%} of f. {remedy}"
+        f"{100 * relative:.0f} % of f. {remedy}"
     )
 
 

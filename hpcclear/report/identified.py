@@ -39,12 +39,18 @@ def short(name: object) -> str:
     return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
 
 
+def named(name: object) -> str:
+    """Return what an unknown is called where it stands alone."""
+    kind = "radial clearance of " if str(name).endswith(".clearance") else ""
+    return kind + short(name)
+
+
 def _records(content: Results) -> list[Line]:
     found = []
     for k, record in enumerate(content["record"].to_numpy()):
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].to_numpy()):
-            found.append(Line(short(name), before + interval(content, k, u)))
+            found.append(Line(named(name), before + interval(content, k, u)))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
             found.append(Line("together", before + _together(content, k)))
         found.append(Line("calibration", before + _calibration(content, k)))
@@ -53,7 +59,7 @@ def _records(content: Results) -> list[Line]:
 
 def _calibration(content: Results, record: int) -> str:
     share, factor = (content[name].to_numpy()[record] for name in ("coverage", "widening"))
-    shown = " and ".join(f"{one:.0%}" for one in share)
+    shown = " and ".join(f"{100 * one:.0f} %" for one in share)
     wider = " and ".join(f"{one:.2g}" for one in factor)
     return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
 
@@ -109,13 +115,13 @@ def _growth(content: Results) -> list[Line]:
         unit = str(content["unit"].to_numpy()[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
         found.append(
-            Line(f"growth, {short(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
+            Line(f"growth, {named(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
         )
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
-            found.append(Line(f"time to {limit}, {short(name)}", text))
+            found.append(Line(f"time to {limit}, {named(name)}", text))
     return found
 
 

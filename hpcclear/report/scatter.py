@@ -37,7 +37,7 @@ def lines(of: Recommended) -> Iterator[Line]:
         f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}"
     )
     if (rest := float(own["unexplained"])) >= 0.005:
-        text += f". The cubic fit does not explain {rest:.0%} of the variance"
+        text += f". The cubic fit does not explain {100 * rest:.0f} % of the variance"
     yield Line("tolerances", text)
 
 
@@ -127,7 +127,7 @@ def _listed(parts: list[tuple[str, float, float]]) -> str:
     ranked = sorted(parts, key=lambda one: -one[1])
     small = [name for name, value, width in ranked if value + width < SMALL]
     shown = [share(*one) for one in ranked if one[0] not in small]
-    return ", ".join([*shown, *[f"{', '.join(small)} below {SMALL:.1%}"] * bool(small)])
+    return ", ".join([*shown, *[f"{', '.join(small)} below {100 * SMALL:.1f} %"] * bool(small)])
 
 
 def share(name: str, value: float, half_width: float) -> str:
@@ -135,8 +135,8 @@ def share(name: str, value: float, half_width: float) -> str:
     if value > half_width:
         places = 0 if half_width >= COARSE else 1
         shown = _upwards(half_width, 10.0 ** -(places + 2))
-        return f"{name} {value:.{places}%} ± {shown:.{places}%}"
-    return f"{name} below {max(half_width, value):.1%}"
+        return f"{name} {100 * value:.{places}f} ± {100 * shown:.{places}f} %"
+    return f"{name} below {100 * max(half_width, value):.1f} %"
 
 
 def _upwards(half_width: float, step: float) -> float:
@@ -193,9 +193,10 @@ def _chaos(of: Recommended) -> Iterator[Line]:
     if not float(own["chaotic"]) > SOME:
         text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
     else:
+        changed, explained = (100 * float(own[name]) for name in ("chaotic", "chaos_share"))
         text += (
-            f". Relative perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples "
-            f"and explain {float(own['chaos_share']):.0%} of its variance"
+            f". Relative perturbations of 1e-9 change {changed:.0f} % of the recommended design's samples "
+            f"and explain {explained:.0f} % of its variance"
         )
     yield Line("chaos", text)
 

@@ -181,7 +181,7 @@ def in_time(samples: Results) -> list[Line]:
     ):
         parts = samples[column].to_numpy() / f if column in samples else np.array([])
         if np.isfinite(parts).any():
-            text = f"median {np.nanmedian(parts):.2%}, largest {np.nanmax(parts):.2%} of f"
+            text = f"median {100 * np.nanmedian(parts):.2f} %, largest {100 * np.nanmax(parts):.2f} % of f"
             lines.append(Line(label, text))
         elif column == name:
             lines.append(Line(label, f"{labels.NOT_CHECKED}; {remedy}"))

@@ -108,8 +108,9 @@ def _joints(scene: SceneTables) -> Iterator[str]:
         pin, key = scene.pin(name), scene.joint_key(name)
         if pin.clearance > WIDEST * pin.bearing_radius:
             yield (
-                f"{key}.clearance = {scene.shown(f'{key}.clearance')} is {pin.clearance / pin.bearing_radius:.0%} of the "
-                "bearing's radius; write the radial clearance, half of the difference of the diameters"
+                f"{key}.clearance = {scene.shown(f'{key}.clearance')} is "
+                f"{100 * pin.clearance / pin.bearing_radius:.0f} % of the bearing's radius; "
+                "write the radial clearance, half of the difference of the diameters"
             )
     for name, film in scene.films().items():
         key = f"{scene.joint_key(name)}.film"

@@ -347,7 +347,7 @@ def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tu
     worst = np.nanmax(within, axis=0, initial=0.0)
     share, doubt = (np.nanmax(true[name], axis=0) for name in ("tolerance", "tolerance_error"))
     tight, _ = stricter(run.scene)
-    numerics, level = tight.numerics, f"{run.study.verification.confidence:.0%}"
+    numerics, level = tight.numerics, f"{100 * run.study.verification.confidence:.0f} %"
     pairs = f"target error {numerics.target_error:g}" if numerics.target_error else f"rtol {numerics.rtol:.0e}"  # fmt: skip
     target = f" (target: {_percents(wanted)})" if run.study.paired else ""
     text = (

@@ -243,7 +243,7 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     _foot(
         figure,
         accuracy,
-        f"Marks: measured; lines: bias and variance over revolutions; grey: cheapest to {AIM:.0%}.",
+        f"Marks: measured; lines: bias and variance over revolutions; grey: cheapest to {100 * AIM:.0f} %.",
         f"{accuracy.attrs.get('motion', '')}.",
     )
     return figure

@@ -83,11 +83,16 @@ def growth_figure(identify: Results) -> "style.Figure":
     Raises
     ------
     InputError
-        There is one record only.
+        There is one record only, or none has a date.
     """
     _check(identify)
     if "rate" not in identify:
-        raise InputError("identify", 1, "one record has no growth", "Give a --signal for each date")
+        raise InputError(
+            "identify",
+            1,
+            "growth needs two records with dates",
+            "Give a --signal and a --date for each",
+        )
     count, days = identify.sizes["unknown"], identify["elapsed"].to_numpy() / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):

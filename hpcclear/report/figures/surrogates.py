@@ -80,7 +80,7 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
             for k, interval in enumerate(intervals):
                 values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
                 look = {**style.look(k), "color": colours[k], "ls": "-", "ms": 2.2, "lw": 0.7}
-                panel.plot(clearance, values, label=f"{interval:.0%}", **look)
+                panel.plot(clearance, values, label=f"{100 * interval:.0f} %", **look)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
         lowest = float(np.nanmin(sensitivity["r2"].sel(surface=surface)))

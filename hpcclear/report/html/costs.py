@@ -60,7 +60,9 @@ def _known(value: Variable, digits: str) -> str:
 
 def _cheapest(found: Results) -> Rows:
     wait = f"the {float(found['spin_up']):.0f} transient revolutions of {targets.REPLICAS} replicas"
-    rows: Rows = [[f"{aim:.1%}", cheapest(found, float(aim))] for aim in found["aim"].to_numpy()]
+    rows: Rows = [
+        [f"{100 * aim:.1f} %", cheapest(found, float(aim))] for aim in found["aim"].to_numpy()
+    ]
     return [*rows, ["time", f"averaged revolutions and {wait}"]]
 
 

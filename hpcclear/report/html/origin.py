@@ -48,7 +48,7 @@ def timing(content: Content) -> list[object] | None:
     spent = {word: float(np.sum(found[name])) for name, word in _PARTS.items()}
     total, count = sum(spent.values()) or 1.0, found.sizes["rank"]
     wall = float(np.sum([found[name].to_numpy().sum(1) for name in _PARTS], axis=0).max())
-    shares = ", ".join(f"{word} {part / total:.0%}" for word, part in spent.items())
+    shares = ", ".join(f"{word} {100 * part / total:.0f} %" for word, part in spent.items())
     words = f"{count} {'rank' if count == 1 else 'ranks'}, {number(wall, 3)} s: {shares}."
     rates = []
     if "samples" in found and spent["computing"] > 0.0:

@@ -39,7 +39,7 @@ def machine(content: Content) -> Screen | None:
     headline = "What to measure: expected half-widths of each signal"
     if unknown:
         last = unknown[-found.sizes["unknown"] :]
-        headline = "; ".join(f"{label}: {text}" for label, text in last[:2])
+        headline = "; ".join(f"{label[0].upper()}{label[1:]}: {text}" for label, text in last[:2])
     failed = known and not found["explained"].to_numpy().all()
     tiles = [
         Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
@@ -68,7 +68,7 @@ def _unknowns(found: Results) -> list[tuple[str, str]]:
     records, names = found["record"].to_numpy(), found["unknown"].to_numpy()
     ends = [f", {Path(str(one)).name}" * (len(records) > 1) for one in records]
     return [
-        (identified.short(name) + end, identified.interval(found, k, u))
+        (identified.named(name) + end, identified.interval(found, k, u))
         for k, end in enumerate(ends)
         for u, name in enumerate(names)
     ]

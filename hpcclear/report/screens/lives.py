@@ -142,7 +142,7 @@ def doubts(content: Results) -> list[str]:
     if moving:
         count = f"{moving} service {'life' if moving == 1 else 'lives'}"
         texts.append(
-            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
+            f"{count} had not reached steady state ({100 * drift.max():.1f} % change with a longer transient); "
             "raise numerics.transient_revolutions"
         )
     if "sharpest" in content:
