@@ -196,6 +196,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if effects.slider_load is not None:
         shape = "constant" if isinstance(effects.slider_load, float) else "against crank angle"
         yield f"slider load, {shape}"
+    yield from scene.joint_effects().values()
     for words, coefficient in scene.joint_frictions().values():
         yield f"{words}, coefficient {coefficient:g}"
     if scene.numerics.formulation == "baumgarte":

@@ -167,6 +167,8 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield from _mean(scene, "slider load", "effects.slider_load", effects.slider_load)
     for key, (words, _) in scene.joint_frictions().items():
         yield Switch(words, {key: None})
+    for key, words in scene.joint_effects().items():
+        yield Switch(words, {key: None})
     if isinstance(mechanism, Planar):
         for load in mechanism.loads:
             key = f"mechanism.loads.{load.name}"

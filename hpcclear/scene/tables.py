@@ -21,6 +21,7 @@ from hpcclear.scene.contacts.declared import AlongLine
 from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Table, nearest
+from hpcclear.scene.loads.declared import loads_of
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
@@ -243,6 +244,13 @@ class SceneTables(Table):
                 where = "" if key == "effects.guide_friction" else f" in {one.name}"
                 found[key] = f"{kind} friction{where}", rubs.coefficient
         return found
+
+    def joint_effects(self) -> dict[str, str]:
+        """Words of effects that joints have as tables of their own, by the dotted paths of these."""
+        return {
+            f"{self.joint_key(one.joint.name)}.{one.entry}": f"{one.effect.words} in {one.joint.name}"
+            for one in loads_of(self.linkage.joints)
+        }
 
     def pin(self, name: str) -> PlanarClearance:
         """The table of a pin in a bearing."""

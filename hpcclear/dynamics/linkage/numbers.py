@@ -100,8 +100,8 @@ def _outside(trees: Forest, found: dict[str, Number]) -> None:
                 found |= hinges(name, rows)
             if drive.no_load_speed is not None:
                 found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
-    for load in trees.mechanism.loads:
-        found |= load.numbers()
+    for acting in (*trees.mechanism.loads, *trees.mechanism.clearances):
+        found |= acting.numbers()
 
 
 def row_of(motion: Motion, base: dict[str, Number]) -> dict[int, Number]:

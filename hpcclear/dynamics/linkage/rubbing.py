@@ -15,7 +15,7 @@ from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
 from hpcclear.dynamics.linkage.kinematics import Mover
-from hpcclear.dynamics.linkage.parts import GROUND, Joint, is_pin, places_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, Joint, is_joint, is_pin, places_of, split
 
 PASSES = 4
 """Of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars."""
@@ -211,13 +211,13 @@ class RubbingPin(Rubbing):
 
     def _held(self, closure: Joint) -> list[tuple[str, Vector]]:
         """By constraint of a joint that closes a loop: the force that it takes off what is beyond."""
-        if not (is_pin(closure) or closure.kind == "slot"):
+        if not is_joint(closure) or closure.kind in ("slide", "fixed"):
             return []  # what is left over of trees are pins and slots
         first, second = (split(place)[0] in self.beyond for place in places_of(closure))
         if first == second:
             return []
         sign = -ONE if first else ONE
-        if closure.kind == "slot":
+        if closure.holds == 1:
             across = self.of.closing.direction(closure).across()
             return [(f"{closure.name}_across", across.times(sign))]
         axes = {"x": Vector(sign, ZERO), "y": Vector(ZERO, sign)}

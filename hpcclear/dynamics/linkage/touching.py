@@ -17,6 +17,10 @@ class Touching:
     def __init__(self, closing: Closing, k: int, contact: Contact, apart: Vector) -> None:
         self._closing, self._k, self._contact, self.apart = closing, k, contact, apart
 
+    def parameter(self, entry: str) -> Term:
+        """One of the joint's numbers, by its entry."""
+        return self._closing.writer.parameter(f"{self._contact.joint.name}_{entry}")
+
     @property
     def across(self) -> Vector:
         """Unit vector to the left of the joint's line."""

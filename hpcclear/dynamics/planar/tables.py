@@ -8,6 +8,7 @@ from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.dynamics.linkage.parts import Body, places_of, split
 from hpcclear.scene import Scene
+from hpcclear.scene.loads.declared import loads_of
 from hpcclear.scene.planar import Planar, PlanarBody, PlanarJoint, is_loose, turns_of
 from hpcclear.scene.points import Points
 
@@ -44,7 +45,7 @@ def _tables(planar: Planar) -> dict[str, Any]:
         "joints": planar.joints,
         "drives": planar.drives,
         "ground": {point.name: (point.x, point.y) for point in planar.ground.points},
-        "loads": planar.loads,
+        "loads": (*planar.loads, *loads_of(planar.joints)),
     }
 
 

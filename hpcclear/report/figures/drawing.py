@@ -88,7 +88,7 @@ class _Drawing(NamedTuple):
             self._body(body.name, colours[body.name])
         self._ground()
         for joint in mechanism.joints:
-            if joint.kind in ("slide", "slot"):
+            if hasattr(joint, "line") and joint.kind != "fixed":
                 self._guide(joint, colours[joint.point.partition(".")[0]])
             self._joint(joint)
         acting = [*self._drives(), *self._loads(), *self._corner()]
@@ -132,7 +132,7 @@ class _Drawing(NamedTuple):
         sheet, point, start = self.sheet, self.placed.at(joint.point), self.placed.at(joint.line)
         along = way(self.placed.angles[joint.line.partition(".")[0]] + joint.angle)
         across, reach = np.array([-along[1], along[0]]), float((point - start) @ along)
-        half = np.array([_PIN, _PIN]) if joint.kind == "slot" else _BLOCK
+        half = _BLOCK if joint.kind == "slide" else np.array([_PIN, _PIN])
         if getattr(joint, "height", None):
             half = np.maximum(0.5 * np.array([joint.length, joint.height]) * sheet.per_m, 3.0)
         ends = (min(reach, 0.0) - self._mm(20.0)[0], max(reach, 0.0) + self._mm(20.0)[0])

@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene.fields import Length, PositiveLength, Table, invalid
+from hpcclear.scene.loads.declared import numbers_of
 
 Number = float | Array
 """One number, or those of samples (m,)."""
@@ -82,6 +83,11 @@ class ContactGeometry(Table):
     def shape(get: Get) -> Shape:
         """Numbers of a contact's samples."""
         raise NotImplementedError
+
+    def numbers(self) -> dict[str, Array | float]:
+        """Parameters of its terms, ``NAME_ENTRY``, SI: its entries that are numbers."""
+        both: Any = self
+        return numbers_of(self, both.name)
 
     def touch(self, on: Any, word: str) -> Any:
         """Terms by `on`, a `hpcclear.dynamics.linkage.touching.Touching`, of one contact: the unit vector from the journal

@@ -1,6 +1,8 @@
 """What a load declares: its table in a scene, its numbers, and the terms that it adds to a motion."""
 
 import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -18,6 +20,62 @@ def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, flo
     nx = ex * inverse
     ny = ey * inverse
     return nx, ny, square * inverse, vx * nx + vy * ny
+
+
+def numbers_of(table: Table, name: str) -> dict[str, Array | float]:
+    """Entries of a table that are numbers, ``NAME_ENTRY``; numbers or arrays of samples."""
+    entries = {entry: getattr(table, entry, None) for entry in type(table).model_fields}
+    return {
+        f"{name}_{entry}": value
+        for entry, value in entries.items()
+        if not (value is None or isinstance(value, (str, bool, tuple, Table)))
+    }
+
+
+class JointEffect(Table):
+    """An effect of a joint: a table in that of the joint, which acts on the motion as a load does."""
+
+    words: ClassVar[str]
+    """What it is called in descriptions of a scene."""
+
+    def act(self, on: Any, joint: Any) -> Any:
+        """As `Load.act`, in the joint that has it; parameters are its entries that are numbers."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class JointLoad:
+    """An effect of a joint as a load of its linkage."""
+
+    name: str
+    entry: str
+    joint: Any
+    effect: JointEffect
+
+    kind: ClassVar[str] = "effect of a joint"
+    table: ClassVar[bool] = False
+    curves: ClassVar[tuple[str, ...]] = ()
+    seconds: ClassVar[float] = 0.0
+    by_angle: ClassVar[bool] = False
+    straight: ClassVar[Mapping[str, Any]] = {}
+
+    def numbers(self) -> dict[str, Array | float]:
+        """As of a load."""
+        return numbers_of(self.effect, self.name)
+
+    def act(self, on: Any) -> Any:
+        """As of a load."""
+        return self.effect.act(on, self.joint)
+
+
+def loads_of(joints: Iterable[Any]) -> tuple[JointLoad, ...]:
+    """Effects of joints, as loads."""
+    return tuple(
+        JointLoad(f"{joint.name}_{entry}", entry, joint, effect)
+        for joint in joints
+        for entry in type(joint).model_fields
+        if isinstance(effect := getattr(joint, entry), JointEffect)
+    )
 
 
 class Load(Table):
@@ -44,12 +102,7 @@ class Load(Table):
 
     def numbers(self) -> dict[str, Array | float]:
         """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
-        entries = {entry: getattr(self, entry) for entry in type(self).model_fields}
-        return {
-            f"{self.name}_{entry}": value
-            for entry, value in entries.items()
-            if not (value is None or isinstance(value, (str, bool, tuple, Table)))
-        }
+        return numbers_of(self, self.name)
 
     def act(self, on: Any) -> Any:
         """Add its forces and torques to a motion by `on`, a `hpcclear.dynamics.linkage.acting.Acting`.
