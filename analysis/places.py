@@ -240,6 +240,7 @@ ADDITIONS = {
           '    seal: SealDrag | None = None\n    """Drag of a seal. Without it there is none."""\n'),
          ("scene/joints.py", "\n\nclass Material(Table)", "from hpcclear.scene.seal import SealDrag\n")),
         _simulated(SLOT, '{"mechanism.joints.o2.seal": {"coefficient": 0.01}}')
+        + 'assert abs(found["energy_residual"].to_numpy()).max() < 1e-3\n'
         + "from hpcclear.scene.describing import effects_on\n"
         "assert 'drag of the seal in o2' in [*effects_on(scene)]\n", 4,
     ),

@@ -148,9 +148,13 @@ class Field(NamedTuple):
     """Whether every file with the outcome of a simulation has it."""
     goal: str = ""
     """What a study makes small by it, in words (`hpcclear.base.objectives.OURS`); "" for no objective."""
-    of: Callable[[Any], Any] | None = None
-    """Its values from what the kernel averaged: of a `hpcclear.dynamics.layout.views.Outcome`, or of the revolutions of one
-    response, whose ``in_revolution("NAME")`` is an integral over a revolution. None where it is filled in later."""
+    of: str | Callable[[Any], Any] | None = None
+    """Its values from what the kernel averaged, by a name or formula: of a `hpcclear.dynamics.layout.views.Outcome`, or of
+    the revolutions of one response; ``in_revolution("NAME")`` is an integral over one. None where it is filled in later."""
+
+    def values(self, outcome: Any) -> Any:
+        """What `of` gives."""
+        return self.of(outcome) if callable(self.of) else getattr(outcome, str(self.of))
 
 
 def _about_mean(o: Any) -> Any:
@@ -191,26 +195,24 @@ _LEVELS = {
 
 FIELDS = {
     "sample": Field("1", "number of the sample in the design", "i8"),  # -1 never leaves the evaluator
-    "objective": Field("objective", "objective f, mean gap between journal and bearing", required=True,
-        of=lambda o: o.objective),  # eq. 13
-    "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True,
-        of=lambda o: o.spread),
+    "objective": Field("objective", "objective f, mean gap between journal and bearing", required=True,  # eq. 13
+        of="objective"),
+    "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True, of="spread"),
     "objective_uncertainty": Field("objective", "half-width of f, by replicas or of its steady mean"),
-    "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint", of=lambda o: o.mean_gap),
+    "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint", of="mean_gap"),
     "peak_contact_force": Field("N", "largest contact force over the averaged revolutions", per="joint",
-        goal="peak contact force", of=lambda o: o.peak_force),
+        goal="peak contact force", of="peak_force"),
     "mean_contact_force": Field("N", "mean contact force over the averaged revolutions", per="joint", when="response",
-        goal="mean contact force", of=lambda o: o.mean_force),
+        goal="mean contact force", of="mean_force"),
     "peak_crank_moment": Field("N m", "largest absolute torque of the drive on the crank", when="response",
-        goal="peak torque of the drive on the crank", of=lambda o: o.peak_moment),
+        goal="peak torque of the drive on the crank", of="peak_moment"),
     "slider_acceleration_deviation": Field("m/s^2", "standard deviation of the slider acceleration in time", when="response",
-        goal="standard deviation in time of the slider acceleration", of=lambda o: o.acceleration_deviation),
+        goal="standard deviation in time of the slider acceleration", of="acceleration_deviation"),
     "point_acceleration_deviation": Field(
         "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response",
-        goal="root mean square about its mean of the acceleration of the followed point",
-        of=lambda o: o.acceleration_deviation),
+        goal="root mean square about its mean of the acceleration of the followed point", of="acceleration_deviation"),
     "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response",
-        goal="largest acceleration of the followed point", of=lambda o: o.peak_acceleration),
+        goal="largest acceleration of the followed point", of="peak_acceleration"),
     **_IMPACTS,
     "band": Field("Hz", "middle of the third-octave band", per="band", when="level"),
     **_LEVELS,

@@ -281,7 +281,7 @@ def outcome_records(
     records["rhs_evaluations"] = outcome.evaluations
     valid = np.isin(records["status"], [status for status in Status if status.valid])
     known = {
-        name: one.of(outcome)
+        name: one.values(outcome)
         for name, one in FIELDS.items()
         if one.of and name in (record.names or ())
         if name in responses or one.when not in ("response", "impact")

@@ -30,8 +30,8 @@ def energies(
     contacts = linkage.mechanism.contacts
     gaps = np.empty((len(eccentricity.T), len(contacts)))
     for k, contact in enumerate(contacts):
-        sizes = (one[..., places[k]] for one in (p.clearance, p.bearing_radius, p.journal_radius))
-        gaps[:, k] = contact.joint.gap(contact.part, eccentricity[k], *sizes)
+        sizes = [one[..., places[k]] for one in (p.clearance, p.bearing_radius, p.journal_radius)]
+        gaps[:, k] = contact.joint.gap(contact.part, eccentricity[k], sizes)
     if any(scene.waves().values()):
         pose = linkage.poses.at(par, q, v, turn_time)[0]
         angles = {body.name: pose.angle[k] for k, body in enumerate(linkage.mechanism.bodies)}

@@ -1,6 +1,6 @@
 """What a geometry of contact declares: the table of its joint in a scene, its numbers, and where its surfaces touch."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -95,16 +95,10 @@ class ContactGeometry(Table):
         along the vector, m."""
         raise NotImplementedError
 
-    def gap(
-        self,
-        word: str,
-        apart: Array,
-        clearance: Array,
-        bearing_radius: Array,
-        journal_radius: Array,
-    ) -> Array:
-        """Gap of a contact, (m,), by the vector (2, m) from the bearing's place, or its line, to the journal."""
-        gap: Array = np.hypot(*apart) - (bearing_radius - journal_radius)
+    def gap(self, word: str, apart: Array, sizes: Sequence[Array]) -> Array:
+        """Gap of a contact, (m,), by the vector (2, m) from the bearing's place, or its line, to the journal; `sizes`: the
+        first three of `Shape`. The energy balance reads it."""
+        gap: Array = np.hypot(*apart) - (sizes[1] - sizes[2])
         return gap
 
 

@@ -1,5 +1,6 @@
 """A pin with clearance: a journal in a round bearing larger than itself, also with an oil film and surfaces out of round."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -82,16 +83,9 @@ class PinInBearing(ContactGeometry):
         radii = (clearance, bearing, journal)
         return Shape(*radii, radii, bearing * journal / clearance)
 
-    def gap(
-        self,
-        word: str,
-        apart: Array,
-        clearance: Array,
-        bearing_radius: Array,
-        journal_radius: Array,
-    ) -> Array:
+    def gap(self, word: str, apart: Array, sizes: Sequence[Array]) -> Array:
         """How much further the journal is off than its clearance."""
-        gap: Array = np.hypot(*apart) - clearance
+        gap: Array = np.hypot(*apart) - sizes[0]
         return gap
 
 

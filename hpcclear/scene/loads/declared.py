@@ -1,8 +1,7 @@
 """What a load declares: its table in a scene, its numbers, and the terms that it adds to a motion."""
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -43,41 +42,6 @@ class JointEffect(Table):
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
-class JointLoad:
-    """An effect of a joint as a load of its linkage."""
-
-    name: str
-    entry: str
-    joint: Any
-    effect: JointEffect
-
-    kind: ClassVar[str] = "effect of a joint"
-    table: ClassVar[bool] = False
-    curves: ClassVar[tuple[str, ...]] = ()
-    seconds: ClassVar[float] = 0.0
-    by_angle: ClassVar[bool] = False
-    straight: ClassVar[Mapping[str, Any]] = {}
-
-    def numbers(self) -> dict[str, Array | float]:
-        """As of a load."""
-        return numbers_of(self.effect, self.name)
-
-    def act(self, on: Any) -> Any:
-        """As of a load."""
-        return self.effect.act(on, self.joint)
-
-
-def loads_of(joints: Iterable[Any]) -> tuple[JointLoad, ...]:
-    """Effects of joints, as loads."""
-    return tuple(
-        JointLoad(f"{joint.name}_{entry}", entry, joint, effect)
-        for joint in joints
-        for entry in type(joint).model_fields
-        if isinstance(effect := getattr(joint, entry), JointEffect)
-    )
-
-
 class Load(Table):
     """A load of a linkage; each kind is a file beside this one.
 
@@ -110,6 +74,34 @@ class Load(Table):
         Returns the power that it gives, W, as a term.
         """
         raise NotImplementedError
+
+
+class JointLoad(Load):
+    """An effect of a joint as a load of its linkage, whose name is that of the joint and of the effect's entry."""
+
+    entry: str
+    joint: Any
+    effect: Any
+
+    def numbers(self) -> dict[str, Array | float]:
+        """Those of the effect."""
+        return numbers_of(self.effect, self.name)
+
+    def act(self, on: Any) -> Any:
+        """As the effect does in its joint."""
+        return self.effect.act(on, self.joint)
+
+
+def loads_of(joints: Iterable[Any]) -> tuple[JointLoad, ...]:
+    """Effects of joints, as loads."""
+    return tuple(
+        JointLoad.model_construct(
+            name=f"{joint.name}_{entry}", entry=entry, joint=joint, effect=effect
+        )
+        for joint in joints
+        for entry in type(joint).model_fields
+        if isinstance(effect := getattr(joint, entry), JointEffect)
+    )
 
 
 class SizedLoad(Load):

@@ -1,7 +1,6 @@
 """Measures of impact and noise of one response: by revolution, and means with confidence intervals."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -106,9 +105,8 @@ def measured_of(
     for name in IMPACTS:
         if scene.modes and name == "rms_frame_force":
             continue
-        formula: Any = FIELDS[name].of
-        values = formula(each)
+        values = FIELDS[name].values(each)
         result[f"{name}_by_revolution"] = values
-        result[name] = formula(together)[0]
+        result[name] = FIELDS[name].values(together)[0]
         result[f"{name}_limit"] = spectra.half_width(values)
     return result
