@@ -37,10 +37,10 @@ SEARCHES = Registry[Callable[..., object]]("search", "hpcclear.searches")
 for _name, _objective in OURS.items():
     OBJECTIVES.add(_name, _objective)
 OBJECTIVES.add_family(LEVEL, level_of)
-SURROGATES.add("kriging", "hpcclear.statistics.surrogate.fitting:KrigingMethod")
-SEARCHES.add("swarm", "hpcclear.statistics.search.mopso:swarm")
+SURROGATES.add("kriging")
+SEARCHES.add("swarm")
 for _name in ("AGEMOEA", "AGEMOEA2", "GDE3", "NSGA2", "NSGA3", "RVEA", "SMSEMOA", "UNSGA3"):
-    SEARCHES.add(f"pymoo:{_name}", f"hpcclear.statistics.search.foreign:{_name}")
+    SEARCHES.add(f"pymoo:{_name}")
 
 KINDS = (CONTACT_LAWS, FRICTION_LAWS, OBJECTIVES, DISTRIBUTIONS, SURROGATES, SEARCHES)
 """Every registry."""

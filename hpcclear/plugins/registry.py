@@ -1,6 +1,5 @@
 """What a name in a scene stands for: one of ours, an installed package's, or one from a file beside the scene."""
 
-import importlib
 import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar, cast
@@ -35,8 +34,8 @@ class Registry(Generic[Plugin]):
         self._families: list[tuple[re.Pattern[str], Callable[[re.Match[str]], object]]] = []
         self._offered: dict[str, _Offered] = {}
 
-    def add(self, name: str, target: object) -> None:
-        """Offer one of ours: an object, or where to find it, "package.module:Name", which is imported at its first use."""
+    def add(self, name: str, target: object = None) -> None:
+        """Offer one of ours: an object, or None of a name whose object the package has that uses it."""
         assert name not in self._ours, f"two {self.kind}s are called {name}"
         self._ours[name] = target
 
@@ -64,7 +63,7 @@ class Registry(Generic[Plugin]):
         Raises InputError: there is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
         """
         if name in self._ours:
-            return cast(Plugin, self._of_ours(name))
+            return cast(Plugin, self._ours[name])
         for names, maker in self._families:
             if matched := names.fullmatch(name):
                 return cast(Plugin, maker(matched))
@@ -89,13 +88,6 @@ class Registry(Generic[Plugin]):
         module = name.partition(":")[0]
         text = (texts_in_use() if texts is None else texts)[module]
         return f"{module}.py, SHA-256 {digest(text)[:12]}"
-
-    def _of_ours(self, name: str) -> object:
-        target = self._ours[name]
-        if isinstance(target, str):
-            module, _, attribute = target.partition(":")
-            self._ours[name] = target = getattr(importlib.import_module(module), attribute)
-        return target
 
     def _of_file(self, name: str, module: str, attribute: str, texts: Mapping[str, str]) -> object:
         if module not in texts:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import moocore
 import numpy as np
@@ -16,6 +17,7 @@ from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
 from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.asking import Search, SearchTask, made, minimise
+from hpcclear.statistics.search.mopso import swarm
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -92,7 +94,11 @@ def _begun(
         ),
     )
     name = settings.algorithm or "swarm"
-    source = SEARCHES.get(name, scene.plugin_texts)
+    if name == "swarm":
+        return made(swarm, name, task), task, name
+    source: Any = SEARCHES.get(name, scene.plugin_texts)
+    if SEARCHES.is_ours(name):
+        source = getattr(foreign, name.removeprefix("pymoo:"))
     maker = partial(foreign.adapted, source) if foreign.is_algorithm(source) else source
     return made(maker, name, task), task, name
 

@@ -51,11 +51,10 @@ def method_of(scene: Scene) -> Method:
         What its scene names has no `fit` or no `predict`.
     """
     settings = scene.required_study.surrogate
-    if settings.model is not None:
+    if settings.model is not None and not SURROGATES.is_ours(settings.model):
         source = SURROGATES.get(settings.model, scene.plugin_texts)
-        if source is not KrigingMethod:
-            made(source, settings.model, 0)  # so that it is refused before anything is simulated
-            return RegressionMethod(source, settings.model)
+        made(source, settings.model, 0)  # so that it is refused before anything is simulated
+        return RegressionMethod(source, settings.model)
     return KrigingMethod(settings.restarts, settings.kernel or SQUARED_EXPONENTIAL)
 
 
