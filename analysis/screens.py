@@ -67,7 +67,7 @@ def made(name: str, place: Path) -> None:
             )
             write_made(machine, place / f"{record}.csv", ["crank_moment"], noise=0.1)
     command = MADE[name]
-    output = "." if command[0] == "run" else f"{command[0]}.nc"
+    output = "." if command[0] == "run" else f"{name}.nc"
     words = [sys.executable, "-m", "hpcclear", *map(str, command), "-o", output]
     subprocess.run(words, cwd=place, check=True)
 

@@ -138,7 +138,7 @@ def map_of_motion(content: Content) -> Screen | None:
     headline = "Every cell failed"
     if kinds:
         (most, _, why), *rest = (regime.meaning.partition(":") for regime, _ in kinds[:2])
-        headline = f"{most.capitalize()} at {kinds[0][1]} of {cells} places{why and ':'}{why}"
+        headline = f"{most.capitalize()} at {kinds[0][1]} of {cells} cells{why and ':'}{why}"
         headline += "".join(f"; {kind} at {kinds[1][1]}" for kind, *_ in rest)
     tiles: tuple[Tile, ...] = ()
     if len(growth):

@@ -33,7 +33,7 @@ def machine(content: Content) -> Screen | None:
     if known:
         coverage = float(np.min(found["coverage"].to_numpy()))
         level = Level.GREEN if coverage >= 0.9 else Level.AMBER
-        text = f"{100 * coverage:.0f} % of simulated machines lie in their 95 % interval"
+        text = f"Check: the 95 % interval holds for {100 * coverage:.0f} % of simulated machines"
         trust.append(Trust(level, text, "identify"))
     unknown = _unknowns(found) if known else []
     headline = "What to measure: expected half-widths of each signal"

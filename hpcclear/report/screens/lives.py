@@ -71,8 +71,18 @@ def _headline(lives: Results) -> str:
         return f"After {_long(cycles)} revolutions the clearance of {name} is {end}"
     value, low, high = spread(lives, "lifetime", cycles)[0]
     if not value.startswith("beyond"):
-        return f"Half of the machines reach a limit within {value} revolutions (95 % CI {low} to {high})"
-    return f"More than half of the machines reach no limit within {_long(cycles)} revolutions"
+        return f"Half of the machines reach {_limit(lives)} within {value} revolutions (95 % CI {low} to {high})"
+    return f"More than half of the machines do not reach {_limit(lives)} within {_long(cycles)} revolutions"
+
+
+def _limit(lives: Results) -> str:
+    """The limit of a service life, where there is one of a clearance or a force."""
+    limits = {name: float(lives.attrs[name]) for name in lives.attrs if name.startswith("limit_")}
+    if list(limits) == ["limit_clearance"]:
+        return f"a clearance of {quantity(limits['limit_clearance'], 'm')}"
+    if list(limits) == ["limit_peak_contact_force"]:
+        return f"a contact force of {quantity(limits['limit_peak_contact_force'], 'N')}"
+    return "a limit"
 
 
 def _long(count: float) -> str:
@@ -102,7 +112,7 @@ def _trust(lives: Results) -> Iterator[Trust]:
     failed = _failed(lives)
     yield from (Trust(Level.AMBER, text, "lives") for text in failed)
     if not failed:
-        yield Trust(Level.GREEN, "No service life failed", "lives")
+        yield Trust(Level.GREEN, "No simulation failed", "lives")
     open_ = int((lives["end_reason"].to_numpy() == "cycles").sum())
     if open_ and _is_limited(lives):
         yield Trust(

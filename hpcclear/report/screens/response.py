@@ -76,9 +76,9 @@ def half_width(response: Results) -> float:
 
 def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tile]:
     f, unit = float(response["objective"]), str(response["objective"].attrs["units"])
-    shown, _, reach = labels.with_half_width(f, half_width(response), unit).partition(" ± ")
-    known = f"{shown} {reach.partition(' ')[2]}" if reach else labels.quantity(f, unit)
-    yield Tile("objective f", known, within=f"± {reach}" if reach else labels.NOT_CHECKED)
+    reach = half_width(response) / abs(f) if f else np.nan
+    within = f"± {100 * reach:.2g} %" if np.isfinite(reach) else labels.NOT_CHECKED
+    yield Tile("f", labels.quantity(f, unit, 2 if reach > 0.05 else 4), within=within)
     for one in sorted(loads, key=lambda one: -one.peak)[:1]:
         angle = "" if bearings.degrees(one) == "–" else f"at {bearings.degrees(one)}"
         yield Tile(f"peak force, {one.joint}", labels.quantity(one.peak, "N"), within=angle)
@@ -116,7 +116,7 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
             "bearings",
         )
     else:
-        yield Trust(Level.GREEN, "f is known within the interval beside it", "bearings")
+        yield Trust(Level.GREEN, f"f is known to ± {100 * reach / abs(f):.2g} %", "bearings")
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
         yield Trust(
             Level.GREEN if regime is Regime.REGULAR else Level.AMBER,
