@@ -90,7 +90,7 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     out = tmp_path / "response.nc"
     done = hpcclear("simulate", "jobs/slider_crank.toml", "-o", out, *SHORT)
     assert done.returncode == 0, done.stderr
-    assert "objective f" in done.stdout
+    assert "f: mean gap" in done.stdout
     response = xr.open_dataset(out)
     assert response["slider_position"].attrs["units"] == "m"
     assert response.sizes["time"] == 721

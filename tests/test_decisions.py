@@ -186,7 +186,7 @@ def test_what_scatters_at_the_recommended_design_makes_all_of_its_scatter(done):
     assert [one[0] for one in scatter.shares(done["contributions"].sel(design="light alpha"))] == [
         "C"
     ]
-    assert re.search(r"C 50(\.0)?% ± ", lines["tolerances"])
+    assert re.search(r"C 50(\.0)? ± [\d.]+ %", lines["tolerances"])
 
 
 def test_verdicts_of_a_study_agree_with_the_truth(done):
