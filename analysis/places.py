@@ -43,10 +43,11 @@ def _simulated(file: str, changes: str) -> str:
 
 SAIL = '''"""Drag of a point, such as that of a sail."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load
 
@@ -66,7 +67,7 @@ class SailLoad(Load):
     coefficient: Annotated[float, Quantity("N*s**2/m**2", least=0)]
     """Force per square of the speed, N s2/m2."""
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """The force at its place."""
         terms = (on.parameter("coefficient"), *on.velocity(self.place))
         force = on.vector(self.name, *on.call(resistance, *terms, results=("fx", "fy")))
@@ -76,10 +77,11 @@ class SailLoad(Load):
 
 TAPERED = '''"""A pin in a slot whose walls are inclined to its line."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
+from hpcclear.base.terms import Term, Touching
 from hpcclear.scene.contacts.pin_in_slot import PlanarSlot
 from hpcclear.scene.fields import Angle
 
@@ -101,7 +103,7 @@ class TaperedSlot(PlanarSlot):
     taper: Angle
     """Slope of either wall against the line."""
 
-    def touch(self, on: Any, word: str) -> Any:
+    def touch(self, on: Touching, word: str) -> tuple[Term, ...]:
         """The pin before an inclined wall."""
         left = self.sides[word] > 0.0
         across = on.across if left else -on.across
@@ -131,6 +133,7 @@ DRAG = '''"""Drag of a pin, such as that of a seal."""
 
 from typing import Annotated, Any, ClassVar
 
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import JointEffect
 
@@ -143,7 +146,7 @@ class SealDrag(JointEffect):
     coefficient: Annotated[float, Quantity("N*m*s/rad", least=0)]
     """Torque per angular speed, N m s/rad."""
 
-    def act(self, on: Any, joint: Any) -> Any:
+    def act(self, on: Acting, joint: Any) -> Term:
         """Opposite torques on both bodies."""
         bodies = [place.partition(".")[0] for place in (joint.journal, joint.bearing)]
         one, two = (on.zero if body == "ground" else on.spin(body) for body in bodies)

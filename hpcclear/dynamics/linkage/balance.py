@@ -7,7 +7,8 @@ of coordinates are solved; those of prescribed angles and guides give moments an
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics, Move, Mover, Point
 from hpcclear.dynamics.linkage.parts import GROUND, Body, is_joint, places_of, split
 from hpcclear.dynamics.linkage.trees import Forest

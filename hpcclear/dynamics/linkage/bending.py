@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.linkage.expression import ZERO, Term, Vector, Writer, named
+from hpcclear.base.terms import ZERO, Term, Vector, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.parts import Body, Number
 
 SHORTEST = 0.005

@@ -7,7 +7,8 @@ what c'' has to be besides them.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,

@@ -6,7 +6,8 @@ A free linkage gets through these by its inertia: see `elements.held_inverse`.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer, named
+from hpcclear.base.terms import ONE, ZERO, Term, named
+from hpcclear.dynamics.linkage.expression import Writer
 
 Matrix = dict[tuple[int, int], Term]
 Vector = dict[int, Term]

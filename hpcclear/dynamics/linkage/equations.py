@@ -2,18 +2,19 @@
 
 import keyword
 
+from hpcclear.base.terms import ONE, ZERO, Term, Vector, named
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Contact, Drive, is_pin, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
-from hpcclear.dynamics.linkage.touching import Touching
+from hpcclear.dynamics.linkage.touching import ContactWriter
 from hpcclear.dynamics.linkage.trees import forest
 
 RESERVED = (
@@ -59,7 +60,9 @@ class MotionEquations:
         if is_round:
             function, frame = "joint_force", self._turns(contact)
         else:
-            touching = contact.joint.touch(Touching(self.closing, k, contact, apart), contact.part)
+            touching = contact.joint.touch(
+                ContactWriter(self.closing, k, contact, apart), contact.part
+            )
             function, frame = "wall_force", f"({', '.join(map(write.text, touching))})"
         made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
         given = f"joints[{k}], ({', '.join(relative)}), {frame}"

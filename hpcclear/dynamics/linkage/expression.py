@@ -4,106 +4,13 @@ Zeros disappear, signs move outwards, and nothing else is rearranged: the text a
 in which the generator did, which decides the last bits. Names are read where they are first needed.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.terms import Term, named
 from hpcclear.dynamics import layout as at
 
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
-
-
-@dataclass(frozen=True)
-class Term:
-    """A sum, a product, a quotient, a name, zero or one; `fixed` if it holds parameters alone."""
-
-    op: str
-    args: tuple["Term", ...] = ()
-    negative: bool = False
-    fixed: bool = True
-    name: str = ""
-
-    def __bool__(self) -> bool:
-        return self.op != "0"
-
-    def __neg__(self) -> "Term":
-        if not self:
-            return self
-        return Term(self.op, self.args, not self.negative, self.fixed, self.name)
-
-    def __abs__(self) -> "Term":
-        return -self if self.negative else self
-
-    def __add__(self, other: "Term") -> "Term":
-        if not (self and other):
-            return self or other
-        left = self.args if self.op == "+" and not self.negative else (self,)
-        right: tuple[Term, ...] = (other,)
-        if other.op == "+" and other.args[0].negative:  # a - (-b - c) is a + b + c
-            right = tuple(-part for part in other.args) if other.negative else other.args
-        return Term("+", left + right, fixed=self.fixed and other.fixed)
-
-    def __sub__(self, other: "Term") -> "Term":
-        return self + -other
-
-    def __mul__(self, other: "Term") -> "Term":
-        if not (self and other):
-            return ZERO
-        negative = self.negative != other.negative
-        for one, two in ((self, other), (other, self)):
-            if one.op == "1":
-                return -abs(two) if negative else abs(two)
-        return Term("*", (abs(self), abs(other)), negative, self.fixed and other.fixed)
-
-    def __truediv__(self, other: "Term") -> "Term":
-        if not self:
-            return ZERO
-        negative = self.negative != other.negative
-        return Term("/", (abs(self), abs(other)), negative, self.fixed and other.fixed)
-
-
-ZERO = Term("0")
-ONE = Term("1")
-
-
-@dataclass(frozen=True)
-class Vector:
-    """Two terms, along x and y."""
-
-    x: Term
-    y: Term
-
-    def __iter__(self) -> Iterator[Term]:
-        yield self.x
-        yield self.y
-
-    def __neg__(self) -> "Vector":
-        return Vector(-self.x, -self.y)
-
-    def __add__(self, other: "Vector") -> "Vector":
-        return Vector(self.x + other.x, self.y + other.y)
-
-    def __sub__(self, other: "Vector") -> "Vector":
-        return Vector(self.x - other.x, self.y - other.y)
-
-    def times(self, *factors: Term) -> "Vector":
-        """By one factor after the other, from the right."""
-        x, y = self.x, self.y
-        for factor in factors:
-            x, y = x * factor, y * factor
-        return Vector(x, y)
-
-    def across(self) -> "Vector":
-        """Turned by a quarter."""
-        return Vector(-self.y, self.x)
-
-
-NOWHERE = Vector(ZERO, ZERO)
-
-
-def named(name: str, fixed: bool = False) -> Term:
-    """A name as a term."""
-    return Term("name", fixed=fixed, name=name)
 
 
 def onto(factor: Term, product: Term) -> Term:

@@ -8,11 +8,11 @@ contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from hpcclear.base.terms import NOWHERE, ZERO, Term, Vector
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.acting import Acting
+from hpcclear.dynamics.linkage.acting import LoadWriter
 from hpcclear.dynamics.linkage.closing import dot
 from hpcclear.dynamics.linkage.equations import MotionEquations
-from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -64,7 +64,7 @@ class _Generator(MotionEquations):
             self.contact(k, contact)
         self.load_power = ZERO
         for load in self.mechanism.loads:
-            acting = Acting(
+            acting = LoadWriter(
                 load.name, self.kinematics, self.writer, self.balance, self.turned,
                 self.rows.places,
             )  # fmt: skip

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
 from hpcclear.dynamics.linkage.bending import Bend
-from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.parts import GROUND, Drive, split
 from hpcclear.dynamics.linkage.trees import Forest
 

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
+from hpcclear.base.terms import named
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.expression import Writer, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics
 from hpcclear.dynamics.linkage.parts import TableRow
 from hpcclear.dynamics.linkage.rows import Rows

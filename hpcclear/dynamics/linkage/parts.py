@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.terms import Acting, Term
 
 GROUND = "ground"
 Pair = tuple[float, float]
@@ -48,7 +49,7 @@ Drive = TableRow
 
 
 class LoadTerms(TableRow, Protocol):
-    """The same of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds by an `acting.Acting`.
+    """The same of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds.
 
     Its entries `place`, `first` and `second` are places, `body` and `other` bodies that rotate, where it has these.
     """
@@ -58,8 +59,8 @@ class LoadTerms(TableRow, Protocol):
     def numbers(self) -> Mapping[str, Number]:
         """Its parameters, SI; numbers or arrays of samples."""
 
-    def act(self, on: Any) -> Any:
-        """Add its forces and torques to a motion; return the power that it gives, W, as a term."""
+    def act(self, on: Acting) -> Term:
+        """Add its forces and torques to a motion; return the power that it gives, W."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ Their rows are parameters, as they may differ from sample to sample; steps end a
 
 from collections.abc import Sized
 
-from hpcclear.dynamics.linkage.expression import Term, Writer, named
+from hpcclear.base.terms import Term, named
+from hpcclear.dynamics.linkage.expression import Writer
 
 
 def starts(name: str, rows: Sized) -> list[str]:

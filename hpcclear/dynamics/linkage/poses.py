@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.terms import ZERO, Term, named
 from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
-from hpcclear.dynamics.linkage.expression import ZERO, Term, Writer, named
+from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism

@@ -10,10 +10,11 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Protocol
 
+from hpcclear.base.terms import ONE, ZERO, Term, Vector, named
 from hpcclear.dynamics.linkage.balance import Balance
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
+from hpcclear.dynamics.linkage.expression import Writer, onto
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.parts import GROUND, Joint, is_joint, is_pin, places_of, split
 

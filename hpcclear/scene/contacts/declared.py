@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.terms import Term, Touching
 from hpcclear.scene.fields import Length, PositiveLength, Table, invalid
 from hpcclear.scene.loads.declared import numbers_of
 
@@ -52,20 +53,23 @@ class ContactGeometry(Table):
     long_entry: ClassVar[tuple[str, str]] = ("length", "bearing")
     """Its entry for the length at right angles to the plane, and the part that has it."""
 
+    def own(self, *entries: str) -> tuple[Any, ...]:
+        """Values of entries that only some of its tables have, or that are given where this is asked."""
+        return tuple(getattr(self, entry) for entry in entries)
+
     @property
     def length_path(self) -> str | None:
         """Where it has its length at right angles to the plane; None where it has none."""
         entry = self.long_entry[0]
         return None if getattr(self, entry, None) is None else entry
 
-    def ideal(self) -> Any:
+    def ideal(self) -> Table | None:
         """The table of the joint without clearance; None where there is no such joint."""
         return None
 
     def contacts(self) -> dict[str, tuple[str, str]]:
         """Places of journal and bearing of its contacts, by the words of `corners`."""
-        both: Any = self
-        return dict.fromkeys(self.corners or ("",), (both.journal, both.bearing))
+        return dict.fromkeys(self.corners or ("",), self.own("journal", "bearing"))
 
     def further_points(self, middle: tuple[float, float]) -> dict[str, tuple[float, float]]:
         """Further points that its contacts need of the body of `point`, in its axes, m; `middle`: the place of `point`."""
@@ -86,13 +90,12 @@ class ContactGeometry(Table):
 
     def numbers(self) -> dict[str, Array | float]:
         """Parameters of its terms, ``NAME_ENTRY``, SI: its entries that are numbers."""
-        both: Any = self
-        return numbers_of(self, both.name)
+        (name,) = self.own("name")
+        return numbers_of(self, name)
 
-    def touch(self, on: Any, word: str) -> Any:
-        """Terms by `on`, a `hpcclear.dynamics.linkage.touching.Touching`, of one contact: the unit vector from the journal
-        into the surface of the bearing, the gap below 0 in flight, m, and how far that surface is from the bearing's place
-        along the vector, m."""
+    def touch(self, on: Touching, word: str) -> tuple[Term, ...]:
+        """Of one contact: the unit vector from the journal into the surface of the bearing, the gap below 0 in flight, m, and
+        how far that surface is from the bearing's place along the vector, m."""
         raise NotImplementedError
 
     def gap(self, word: str, apart: Array, sizes: Sequence[Array]) -> Array:
@@ -131,16 +134,16 @@ class AlongLine(DryJoint):
     start_offset: Length | None = None
     """Distance of the middle from the line at the start, positive to the left, m; default 0."""
 
-    def ideal(self) -> Any:
+    def ideal(self) -> Table:
         """The same joint without clearance."""
-        own = {entry: getattr(self, entry) for entry in ("name", "kind", "point", "line", "angle")}
-        return type(self).model_construct(**own)
+        entries = "name", "kind", "point", "line", "angle"
+        return type(self).model_construct(**dict(zip(entries, self.own(*entries), strict=True)))
 
     def start(self) -> tuple[Number, ...]:
         """How far it is from the line."""
         return (0.0 if self.start_offset is None else self.start_offset,)
 
-    def touch(self, on: Any, word: str) -> Any:
+    def touch(self, on: Touching, word: str) -> tuple[Term, ...]:
         """An arc against a face that is parallel to the line."""
         across = on.across if self.sides[word] > 0.0 else -on.across
         sizes = on.bearing_radius, on.journal_radius

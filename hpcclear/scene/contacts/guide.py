@@ -5,7 +5,7 @@ radius is the distance of a face from that line, the journal's that of the corne
 distance of the corner's centre less the difference of both. The contact point lies half-way through the overlap.
 """
 
-from typing import Any, ClassVar, Literal, cast
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -71,20 +71,20 @@ class Guide(AlongLine):
 
     def contacts(self) -> dict[str, tuple[str, str]]:
         """The centres of its corners, and the line."""
-        both: Any = self
-        body = both.point.partition(".")[0]
-        return {word: (f"{body}.{both.name}_{word}", both.line) for word in CORNERS}
+        name, point, line = self.own("name", "point", "line")
+        body = point.partition(".")[0]
+        return {word: (f"{body}.{name}_{word}", line) for word in CORNERS}
 
     def further_points(self, middle: tuple[float, float]) -> dict[str, tuple[float, float]]:
         """The centres of its corners."""
-        both: Any = self
-        return {f"{both.name}_{word}": self._corner(middle, word) for word in CORNERS}
+        (name,) = self.own("name")
+        return {f"{name}_{word}": self._corner(middle, word) for word in CORNERS}
 
-    def _corner(self, middle: tuple[float, float], word: str) -> tuple[Any, Any]:
+    def _corner(self, middle: tuple[float, float], word: str) -> tuple[float, float]:
         """Centre of a corner's arc in the slider's axes, m."""
-        (x, y), (ahead, aside), own = middle, CORNERS[word], cast(Any, self)
-        radius = own.corner_radius
-        return x + ahead * (0.5 * own.length - radius), y + aside * (0.5 * own.height - radius)
+        (x, y), (ahead, aside) = middle, CORNERS[word]
+        length, height, radius = self.own("length", "height", "corner_radius")
+        return x + ahead * (0.5 * length - radius), y + aside * (0.5 * height - radius)
 
     def _tilt(self) -> Number:
         return 0.0 if self.start_tilt is None else self.start_tilt
@@ -95,12 +95,13 @@ class Guide(AlongLine):
 
     def gaps(self) -> tuple[Number, ...]:
         """Of its corners."""
-        (offset, _), tilt, own = self.start(), self._tilt(), cast(Any, self)
+        (offset, _), tilt = self.start(), self._tilt()
+        height, radius, clearance = self.own("height", "corner_radius", "clearance")
         found = []
         for word, side in self.sides.items():
             x, y = self._corner((0.0, 0.0), word)
             away = side * (offset + x * np.sin(tilt) + y * np.cos(tilt))
-            found.append(away + own.corner_radius - 0.5 * own.height - own.clearance)
+            found.append(away + radius - 0.5 * height - clearance)
         return tuple(found)
 
     @staticmethod

@@ -1,7 +1,7 @@
 """A pin with clearance: a journal in a round bearing larger than itself, also with an oil film and surfaces out of round."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -99,7 +99,7 @@ class PlanarClearance(PinInBearing):
     """``body.point`` or ``ground.point`` at the centre of the bearing."""
     materials: Materials
 
-    def ideal(self) -> Any:
+    def ideal(self) -> PlanarRevolute:
         """A pin without clearance."""
         places = {entry: getattr(self, entry) for entry in ("name", "journal", "bearing")}
         return PlanarRevolute.model_construct(kind="revolute", **places)

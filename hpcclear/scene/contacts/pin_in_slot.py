@@ -4,7 +4,7 @@ A joint has two such contacts. The slot's line runs midway between its walls. Co
 whose circle is the whole pin. The pin turns freely in the slot.
 """
 
-from typing import Any, ClassVar, Literal, cast
+from typing import ClassVar, Literal
 
 from hpcclear.scene.contacts.declared import AlongLine, Get, Number, Shape
 from hpcclear.scene.fields import Angle, PositiveLength
@@ -42,7 +42,7 @@ class PlanarSlot(AlongLine):
 
     def gaps(self) -> tuple[Number, ...]:
         """At either wall."""
-        (offset,), clearance = self.start(), cast(Any, self.clearance)
+        (offset,), (clearance,) = self.start(), self.own("clearance")
         return tuple(side * offset - clearance for side in WALLS.values())
 
     @staticmethod

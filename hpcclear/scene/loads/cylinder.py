@@ -1,9 +1,10 @@
 """A force between two points by a law of their distance: hydraulic or pneumatic cylinder, gas spring, end stop, cable."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import hinges
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, Pairs
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load, along
@@ -34,7 +35,7 @@ class CylinderLoad(Load):
             found.update(hinges(name, rows))
         return found
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
         nx, ny, length, rate = on.call(

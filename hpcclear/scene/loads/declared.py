@@ -9,6 +9,7 @@ from pydantic import Field
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Table, invalid
 
 
@@ -37,7 +38,7 @@ class JointEffect(Table):
     words: ClassVar[str]
     """What it is called in descriptions of a scene."""
 
-    def act(self, on: Any, joint: Any) -> Any:
+    def act(self, on: Acting, joint: Any) -> Term:
         """As `Load.act`, in the joint that has it; parameters are its entries that are numbers."""
         raise NotImplementedError
 
@@ -68,11 +69,8 @@ class Load(Table):
         """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
         return numbers_of(self, self.name)
 
-    def act(self, on: Any) -> Any:
-        """Add its forces and torques to a motion by `on`, a `hpcclear.dynamics.linkage.acting.Acting`.
-
-        Returns the power that it gives, W, as a term.
-        """
+    def act(self, on: Acting) -> Term:
+        """Add its forces and torques to a motion; return the power that it gives, W."""
         raise NotImplementedError
 
 
@@ -81,13 +79,13 @@ class JointLoad(Load):
 
     entry: str
     joint: Any
-    effect: Any
+    effect: JointEffect
 
     def numbers(self) -> dict[str, Array | float]:
         """Those of the effect."""
         return numbers_of(self.effect, self.name)
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """As the effect does in its joint."""
         return self.effect.act(on, self.joint)
 

@@ -1,7 +1,8 @@
 """A torque against the rotation of a body, such as that of a fan or of oil that is stirred."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load
 
@@ -22,7 +23,7 @@ class DragLoad(Load):
     quadratic: Annotated[float, Quantity("N*m*s**2/rad**2", least=0)] = 0.0
     """Torque per square of the angular speed, N m s2/rad2, as of a fan."""
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """The torque."""
         spin = on.spin(self.body)
         (torque,) = on.call(

@@ -1,12 +1,13 @@
 """A force at a point: gas, wind, the resistance of a workpiece."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import Angle, PairTable, Quantity, check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
@@ -62,7 +63,7 @@ class ForceLoad(SizedLoad):
         x, y = self.components()
         return {f"{self.name}_force_x": x, f"{self.name}_force_y": y}
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """The force at its place."""
         now = on.curve() if self.table else on.one
         parts = zip("xy", self.components(), strict=True)

@@ -1,9 +1,10 @@
 """A spring and damper between two points, on both sides of its length or on one."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load, along
 
@@ -33,7 +34,7 @@ class SpringLoad(Load):
     """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
     stop; "pulling": only when longer, as a rope."""
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
         made = ("nx", "ny", "length", "rate")

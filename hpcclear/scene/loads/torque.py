@@ -1,9 +1,10 @@
 """A torque on a body."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
@@ -32,7 +33,7 @@ class TorqueLoad(SizedLoad):
         """Its size."""
         return {f"{self.name}_torque": self.constant}
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """The torque on its body."""
         now = on.curve() if self.table else on.one
         torque = on.let(self.name, on.parameter("torque") * now)

@@ -1,7 +1,8 @@
 """A spring, a damper and end stops on the angle of a body, against the ground or another body."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
+from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Angle, Quantity, invalid
 from hpcclear.scene.loads.declared import Load
 
@@ -40,7 +41,7 @@ class TorsionSpringLoad(Load):
         """Unless it is a damper alone."""
         return self.stiffness != 0.0 or self.stop_stiffness != 0.0
 
-    def act(self, on: Any) -> Any:
+    def act(self, on: Acting) -> Term:
         """Torques on both bodies."""
         angle, rate = on.angle(self.body), on.spin(self.body)
         if self.other is not None:
