@@ -1,11 +1,15 @@
 """Springs, stops, cylinders, drag and motors by their curves, in closed form; `test_generated` has them on linkages against the
 dense model."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.scene.joints import PlanarRevolute
+from hpcclear.scene.loads.declared import JointEffect
 
 INERTIA, STIFFNESS, START = 2e-3, 0.8, 0.4
 PIN = {"kind": "revolute", "bearing": "ground.o"}
@@ -42,6 +46,57 @@ def angle_of(found, body):
     return found["body_angle"].sel(body=body).to_numpy()
 
 
+def damped(time, inertia, damping):
+    """Angle of what is let go at `START`, on a spring of `STIFFNESS`."""
+    decay = damping / (2 * inertia)
+    w = np.sqrt(STIFFNESS / inertia - decay**2)
+    return START * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time))
+
+
+class Coil(JointEffect):
+    """A spring and a damper in a pin."""
+
+    words: ClassVar[str] = "coil"
+    stiffness: float
+    damping: float
+
+    def act(self, on, joint):
+        one, two = (place.partition(".")[0] for place in (joint.journal, joint.bearing))
+        turned, rate = on.angle(one) - on.angle(two), on.spin(one) - on.spin(two)
+        torque = -(on.parameter("stiffness") * turned + on.parameter("damping") * rate)
+        on.twist(one, torque)
+        on.twist(two, -torque)
+        return torque * rate
+
+
+class Sprung(PlanarRevolute):
+    coil: Coil | None = None
+
+
+def test_an_effect_of_a_joint_acts_between_its_bodies():
+    """Two equal wheels about one axis with a coil between them, against the closed form and against the same as a load."""
+    wheel = {"mass": 0.5, "inertia": INERTIA, "points": {"o": [0.0, 0.0]}}
+    bodies = {"one": {**wheel, "start_angle": START}, "two": wheel}
+    joints = {
+        "pivot": {**PIN, "journal": "two.o"},
+        "elbow": {"kind": "revolute", "journal": "one.o", "bearing": "two.o"},
+    }
+    own = {"stiffness": STIFFNESS, "damping": 4e-3}
+    load = {"kind": "torsion-spring", "body": "one", "other": "two", **own}
+    bare = machine({}, bodies, joints)
+    *others, elbow = bare.mechanism.joints
+    sprung = Sprung.model_construct(**{**dict(elbow), "coil": Coil(**own)})
+    planar = bare.mechanism.model_copy(update={"joints": (*others, sprung)})
+    scene = type(bare).model_construct(**{**dict(bare), "mechanism": planar})
+    assert scene.joint_effects() == {"mechanism.joints.elbow.coil": "coil in elbow"}
+    found, same = simulate(scene), simulate(machine({"elbow_coil": load}, bodies, joints))
+    apart = angle_of(found, "one") - angle_of(found, "two")
+    expected = damped(found["time"].to_numpy(), INERTIA / 2, own["damping"])
+    np.testing.assert_allclose(apart, expected, atol=1e-8 * START)
+    for name in ("body_angle", "body_spin", "load_work", "kinetic_energy"):
+        np.testing.assert_allclose(found[name], same[name], rtol=1e-12, atol=1e-14)
+
+
 def test_a_torsion_spring_swings_with_its_period():
     spring = {"kind": "torsion-spring", "body": "pendulum", "stiffness": STIFFNESS, "angle": 0.1}
     found = simulate(machine({"coil": spring}))
@@ -56,9 +111,7 @@ def test_a_damped_torsion_spring_loses_what_its_damper_takes():
         "kind": "torsion-spring", "body": "pendulum", "stiffness": STIFFNESS, "damping": damping,
     }  # fmt: skip
     found = simulate(machine({"coil": spring}))
-    time, decay = found["time"].to_numpy(), damping / (2 * INERTIA)
-    w = np.sqrt(STIFFNESS / INERTIA - decay**2)
-    expected = START * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time))
+    expected = damped(found["time"].to_numpy(), INERTIA, damping)
     np.testing.assert_allclose(angle_of(found, "pendulum"), expected, atol=1e-8 * START)
     stored = 0.5 * STIFFNESS * (START**2 - angle_of(found, "pendulum") ** 2)
     kinetic = found["kinetic_energy"].to_numpy() - found["kinetic_energy"].to_numpy()[0]
