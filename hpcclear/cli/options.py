@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 from click.core import ParameterSource
+from click.decorators import FC
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
@@ -48,19 +49,19 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
     return path
 
 
-def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
+def output_option(words: str, required: bool = True) -> Callable[[FC], FC]:
     """The option that names the file that results go to."""
     return click.option(
         "-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name
     )
 
 
-def directory_option(words: str) -> Callable[[Any], Any]:
+def directory_option(words: str) -> Callable[[FC], FC]:
     """The option that names the directory that results go to."""
     return click.option("-o", "--output", type=PATH, required=True, help=words)
 
 
-def flag(name: str, words: str) -> Callable[[Any], Any]:
+def flag(name: str, words: str) -> Callable[[FC], FC]:
     """An option that is given or not."""
     return click.option(name, is_flag=True, help=words)
 

@@ -4,6 +4,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.report.figures import labels, style
@@ -39,11 +40,11 @@ class Lettering:
         canvas: Any = axes.figure.canvas
         self._renderer = canvas.get_renderer()
 
-    def paper(self, places: Any) -> Array:
+    def paper(self, places: ArrayLike) -> Array:
         """Places (..., 2) from the lower left corner in points."""
         return (np.asarray(places, float) - self.corners[0]) * self.per_m
 
-    def line(self, places: Any, colour: str, width: float = 0.8, **look: Any) -> None:
+    def line(self, places: ArrayLike, colour: str, width: float = 0.8, **look: Any) -> None:
         """A line through places (n, 2) that words avoid."""
         corners = np.asarray(places, float)
         self.axes.plot(*corners.T, color=style.colour(colour), lw=width, **look)
@@ -53,7 +54,7 @@ class Lettering:
         if width >= _BAR:
             self._mark(along, 200.0)
 
-    def dot(self, place: Any, marker: str, size: float, **look: Any) -> None:
+    def dot(self, place: Array, marker: str, size: float, **look: Any) -> None:
         """A marker of a diameter in points, which words avoid."""
         named = {key: style.colour(look[key]) for key in look.keys() & {"mfc", "mec", "color"}}
         self.axes.plot(*place, marker, ms=size, **{**look, **named})
@@ -62,7 +63,7 @@ class Lettering:
         self._mark(around)
 
     def arrow(
-        self, start: Any, end: Any, colour: str, ends: str = "->", width: float = 0.9
+        self, start: Array, end: Array, colour: str, ends: str = "->", width: float = 0.9
     ) -> None:
         """An arrow between two places, with heads as matplotlib writes them."""
         look: style.Look = {"arrowstyle": ends, "color": style.colour(colour), "lw": width}
@@ -71,11 +72,11 @@ class Lettering:
         self.axes.annotate("", last, first, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})
         self._mark(_sampled(self.paper([first, last])))
 
-    def crowding(self, start: Any, end: Any) -> int:
+    def crowding(self, start: Array, end: Array) -> int:
         """How many samples of the way between two places have a line near them."""
         return self._near(_sampled(self.paper([start, end])))
 
-    def word(self, places: Any, text: str, colour: str, clear: float = 0.0) -> None:
+    def word(self, places: ArrayLike, text: str, colour: str, clear: float = 0.0) -> None:
         """Write a word beside one of its places (n, 2) or (2,), at least `clear` points away; a line leads to a distant one."""
         anchors = np.atleast_2d(self.paper(places))
         written, size = self._written(text, colour)
@@ -94,7 +95,7 @@ class Lettering:
             lead = self.corners[0] + np.array([anchor, edge]) / self.per_m
             self.line(lead, colour, 0.4, zorder=3)
 
-    def dimension(self, ends: Any, text: str, along: Array, levels: Array) -> bool:
+    def dimension(self, ends: ArrayLike, text: str, along: Array, levels: Array) -> bool:
         """Draw a dimension line along a direction (2,) between two places (2, 2), at one of the levels across it (m); return
         whether one has room."""
         written, size = self._written(text, "ink")
