@@ -236,14 +236,8 @@ def check_mode(
 ) -> None:
     """Raise UsageError where options were given that a mode of a command does not use.
 
-    Parameters
-    ----------
-    mode : str
-        The flag that chooses the mode.
-    chosen : bool
-        Whether it was given.
-    others, its_own : sequence of str
-        Parameters that are of use only without the flag, and only with it.
+    `mode`: the flag that chooses it, `chosen`: whether that was given; `others` and `its_own`: parameters that are of use
+    only without the flag, and only with it.
     """
     context = click.get_current_context()
     for option in context.command.params:

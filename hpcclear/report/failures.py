@@ -31,13 +31,8 @@ class SampledVariable(NamedTuple):
 
 
 def explained(samples: Results) -> list[str]:
-    """Return a sentence for each status of failed samples: how many, why, in which ranges of which variables, what to do.
-
-    Parameters
-    ----------
-    samples : xarray.Dataset
-        Kind ``samples``.
-    """
+    """Return a sentence for each status of failed samples (kind ``samples``): how many, why, in which ranges of which
+    variables, what to do."""
     return list(sentences(samples["status"].to_numpy(), variables(samples)))
 
 

@@ -20,15 +20,8 @@ Extent = Callable[[Scene, int | None], tuple[int, float]]
 def certify(run: StudyRun, extent: Extent) -> None:
     """Simulate with effects on and off, each design of it kept by itself; write effects.nc and report what can be left out.
 
-    Parameters
-    ----------
-    extent : Extent
-        As `hpcclear.study.extent.certificate_extent`.
-
-    Raises
-    ------
-    InputError
-        No effect of the scene can be off, or its objective is zero.
+    `extent`: as `hpcclear.study.extent.certificate_extent`. Raises InputError if no effect of the scene can be off, or its
+    objective is zero.
     """
     asked = run.study.certificate
     assert asked is not None

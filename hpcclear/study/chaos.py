@@ -31,13 +31,7 @@ def designs(study: Study) -> int:
 
 def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
     """Standard deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where
-    all failed.
-
-    Raises
-    ------
-    InputError
-        If all simulations fail.
-    """
+    all failed. Raises InputError if all simulations fail."""
     batches = []
     for choice in choices:
         points = monte_carlo(
@@ -70,13 +64,7 @@ def split(pairs: np.ndarray) -> tuple[float, float, float]:
 
 
 def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
-    """Write chaos.nc.
-
-    Parameters
-    ----------
-    found : dict of arrays, shape (n,)
-        Of `simulate`.
-    """
+    """Write chaos.nc of what `simulate` found."""
     coords = {"design": np.array([choice.name for choice in choices])}
     data = {
         "chaos_deviation": found["deviation"],

@@ -35,20 +35,11 @@ def of_designs(
 ) -> Result:
     """Contributions of the random inputs to the scatter of designs.
 
-    Parameters
-    ----------
-    made : sequence of arrays, shape (2, replicates, values)
-        Of `hpcclear.study.truth.made`.
-    drawn : callable
-        A design and its f, (replicates, values), to the points they were taken at.
-
-    Returns
-    -------
-    dict of arrays
-        ``contribution``, ``halved`` and their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has
-        them, and ``group``, 0 of independent inputs; NaN for inputs that do not belong to a design's case;
-        ``halving_cost``, (n, inputs), NaN where it is not known; ``halved_together`` of the inputs to tighten first,
-        ``unexplained``, and their ``_error``, (n,).
+    From simulations, (2, replicates, values) each, of `hpcclear.study.truth.made`; `drawn`: from a design and its f,
+    (replicates, values), to the points they were taken at. Returns ``contribution``, ``halved`` and their ``_error``, (n,
+    inputs), as `hpcclear.statistics.sensitivity.contributions` has them, and ``group``, 0 of independent inputs; NaN for
+    inputs that do not belong to a design's case; ``halving_cost``, (n, inputs), NaN where it is not known;
+    ``halved_together`` of the inputs to tighten first, ``unexplained``, and their ``_error``, (n,).
     """
     names = inputs_of(run)
     result: Result = {

@@ -12,12 +12,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
     """Samples on the ranks by stage, if no surface or model is refused.
 
     The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
-    accuracy verified designs are taken to need what the paper's did.
-
-    Raises
-    ------
-    InputError
-        If the scene has no study.
+    accuracy verified designs are taken to need what the paper's did. Raises InputError if the scene has no study.
     """
     found = _of_stages(scene)
     asked = scene.required_study.certificate
@@ -40,13 +35,7 @@ def loads_of(scene: Scene) -> int:
 
 
 def responses_of(scene: Scene) -> int:
-    """Single responses, which root simulates alone.
-
-    Raises
-    ------
-    InputError
-        If the scene has no study.
-    """
+    """Single responses, which root simulates alone. Raises InputError if the scene has no study."""
     return sum(stage.responses(scene) for stage in STAGES)
 
 

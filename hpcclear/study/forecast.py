@@ -151,19 +151,11 @@ class _Run(StudyRun):
 
 
 def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, float]:
-    """Simulations that a study takes as a rule, and what one of them costs on one core.
+    """Simulations that a study with cases takes as a rule, and what one of them costs on one core.
 
-    Where fewer than `LEAST` simulations per input take longer than `LONGEST`, designs of the pilot make no mechanisms, or worn
-    clearances are needed that are not known yet, these are `hpcclear.study.extent.samples_of` and `seconds`.
-
-    Parameters
-    ----------
-    scene : Scene
-        With cases.
-    evaluate : function
-        Points to records of the study's objective.
-    seconds : float
-        Of a simulation, as far as is known without a pilot.
+    Where fewer than `LEAST` simulations per input take longer than `LONGEST`, designs of the pilot make no mechanisms, or
+    worn clearances are needed that are not known yet, these are `hpcclear.study.extent.samples_of` and `seconds`, the cost
+    as far as it is known without a pilot. `evaluate`: from points to records of the study's objective.
     """
     from threadpoolctl import threadpool_limits
 

@@ -25,21 +25,11 @@ def launch(
     fresh: bool,
     progress_style: str,
 ) -> Path:
-    """Run a study under ``mpiexec -n RANKS``; what it prints goes to standard error as it comes.
+    """Run a study under ``mpiexec -n RANKS``; what it prints goes to standard error as it comes. Returns the directory of
+    the results.
 
-    Returns
-    -------
-    Path
-        The directory of the results.
-
-    Raises
-    ------
-    InputError
-        No mpiexec, or input that the study refuses.
-    Stopped
-        It was stopped early; everything finished is on disk.
-    RuntimeError
-        It failed; the message ends with what it printed last.
+    Raises InputError without mpiexec, or for input that the study refuses; Stopped if it was stopped early (everything
+    finished is on disk); RuntimeError, which ends with what it printed last, if it failed.
     """
     program = _mpiexec(ranks)
     content = {

@@ -59,18 +59,11 @@ def simulations_of_designs(scene: Scene) -> int:
 
 
 def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result:
-    """What the baseline design and the ends of the front (alpha, beta) of each case come to over service lives of their own.
+    """What the baseline design and the ends of the front (alpha, beta) of each case come to over service lives of their
+    own.
 
-    Parameters
-    ----------
-    scene : Scene
-        As it was written: clearances that wear are not known yet.
-
-    Returns
-    -------
-    dict of arrays, shape (n,)
-        ``mean`` and ``deviation`` of f over service lives and ages, and their ``_reach`` (95 % half-width); NaN of other
-        designs.
+    `scene`: as it was written, with clearances that wear not known yet. Returns ``mean`` and ``deviation`` of f over
+    service lives and ages, and their ``_reach`` (95 % half-width), (n,); NaN of other designs.
     """
     (run.directory / FOLDER).mkdir(exist_ok=True)
     cases = run.study.cases
@@ -112,13 +105,11 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
 
 
 def known(run: StudyRun) -> Scene:
-    """A run's scene with clearances of its lives in place of inputs that wear; lives followed earlier are taken as they are.
+    """A run's scene with clearances of its lives in place of inputs that wear; lives followed earlier are taken as they
+    are.
 
-    Raises
-    ------
-    InputError
-        Too few lives reach the age requested, or their clearances leave the variable's range.
-    Stopped, StorageError, RankFailed
+    Raises InputError if too few lives reach the age requested, or their clearances leave the variable's range; Stopped,
+    StorageError, RankFailed.
     """
     run.announce("wear")
     scene, options = run.scene, Options(style=run.simulations.style)

@@ -29,14 +29,8 @@ from hpcclear.study.surrogates import method_of
 
 
 def optimise(run: StudyRun, model: Piecewise) -> Result:
-    """All runs of the swarm on all cases.
-
-    Returns
-    -------
-    dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + objectives): design coordinates, and what the case makes
-        small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
-    """
+    """All runs of the swarm on all cases: for case number k ``front_k`` (runs, solutions, d + objectives), design coordinates
+    and what the case makes small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,)."""
     result: Result = {}
     others = surrogates.of_further(run, model)
     for index, case in enumerate(run.study.cases):
@@ -62,13 +56,8 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the surrogate and the search a study requires can be had, before anything is simulated.
-
-    Raises
-    ------
-    InputError
-        A package is not installed, or it is none.
-    """
+    """That the surrogate and the search a study requires can be had, before anything is simulated. Raises InputError if a
+    package is not installed, or it is none."""
     method_of(scene)
     for case in scene.required_study.cases:
         region = box(scene, scene.required_study.design_variables(case.name))

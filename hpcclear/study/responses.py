@@ -63,14 +63,9 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """Statistics of each design's steady response and of copies perturbed at their start, segment by segment.
 
-    Where motion is chaotic one response says little of a design: copies see other segments of the
-    same motion.
-
-    Returns
-    -------
-    dict of arrays
-        ``names`` (designs,) and ``statistics`` (designs, copies, windows, `STATISTICS`, `QUANTITIES`), SI; NaN where a
-        simulation failed.
+    Where motion is chaotic one response says little of a design: copies see other segments of the same motion. Returns
+    ``names`` (designs,) and ``statistics`` (designs, copies, windows, `STATISTICS`, `QUANTITIES`), SI; NaN where a
+    simulation failed.
     """
     settings = run.study.verification
     chosen = compared(run, designs)

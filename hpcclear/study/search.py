@@ -24,16 +24,8 @@ from hpcclear.study.surrogates import of_further
 def search(run: StudyRun, start: Sequence[Choice], model: Piecewise) -> Result:
     """Designs of each case to verify beside the swarm's ends, from all designs of the swarm and the surrogate of f.
 
-    Returns
-    -------
-    dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is not the case's); ``remarks``: what a
-        reader should know, a sentence each.
-
-    Raises
-    ------
-    InputError
-        If all simulations of a round fail.
+    Returns ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is not the case's); ``remarks``: what
+    a reader should know, a sentence each. Raises InputError if all simulations of a round fail.
     """
     found, remarks = searched(run, start, [model, *of_further(run, model)])
     names = run.study.optimisation

@@ -70,13 +70,8 @@ def parameter(run: StudyRun) -> str:
 
 
 def analyse(run: StudyRun) -> Result:
-    """Simulate all surfaces' points as one batch, then fit, differentiate and rank.
-
-    Returns
-    -------
-    dict of arrays
-        The data variables of sensitivity.nc, its coordinates but for names, and ``failed``.
-    """
+    """Simulate all surfaces' points as one batch, then fit, differentiate and rank. Returns the data variables of
+    sensitivity.nc, its coordinates but for names, and ``failed``."""
     designs = _designs(run)
     inputs = surfaces(run.study)
     batches = [

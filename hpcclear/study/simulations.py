@@ -56,29 +56,17 @@ class Simulations:
         self._variables = scene.required_study.variables
 
     def designs(self, names: Sequence[str], coordinates: Array) -> Points:
-        """Designs in all study variables; those not named stay as in the scene.
+        """Designs in all study variables from sampling coordinates (n, d), in which an inertia may be a ratio
+        (`hpcclear.scene.domain`); those not named stay as in the scene.
 
-        Parameters
-        ----------
-        coordinates : array, shape (n, d)
-            In sampling coordinates: an inertia may be a ratio (`hpcclear.scene.domain`).
-
-        Raises
-        ------
-        InputError
-            If a design makes no mechanism, or a variable that is not named drives entries that
-            differ in the scene.
+        Raises InputError if a design makes no mechanism, or a variable that is not named drives entries that differ in the
+        scene.
         """
         return self.filled(names, to_physical(self.scene, names, coordinates))
 
     def filled(self, names: Sequence[str], values: Array) -> Points:
-        """The same from values in SI, shape (n, d); the other variables as in the scene.
-
-        Raises
-        ------
-        InputError
-            If a variable that is left out drives entries that differ in the scene.
-        """
+        """The same from values in SI, shape (n, d); the other variables as in the scene. Raises InputError if a variable
+        that is left out drives entries that differ in the scene."""
         columns = []
         for variable in self._variables:
             if variable.name in names:
@@ -102,13 +90,8 @@ class Simulations:
         return points
 
     def records(self, points: Points, stage: str) -> np.ndarray:
-        """Outcome records of designs in all study variables, in their order; of load cases that which counts.
-
-        Raises
-        ------
-        InputError
-            If every single simulation failed.
-        """
+        """Outcome records of designs in all study variables, in their order; of load cases that which counts. Raises
+        InputError if every single simulation failed."""
         return self.judged(points, stage)[0]
 
     def judged(self, points: Points, stage: str) -> tuple[np.ndarray, Array]:

@@ -297,15 +297,8 @@ def files_of(scene: Scene) -> list[str]:
 
 
 def carry_out(run: StudyRun, extent: Extent) -> None:
-    """All stages, in their order.
-
-    Parameters
-    ----------
-    run : StudyRun
-        Of the scene as written.
-    extent : function
-        How much the effect screening simulates (`hpcclear.study.extent.certificate_extent`).
-    """
+    """All stages, in their order, of a run of the scene as written; `extent`: how much the effect screening simulates
+    (`hpcclear.study.extent.certificate_extent`)."""
     results: dict[str, object] = {"scene": run.scene, "extent": extent}
     for stage in stages_of(run.scene):
         arguments = [results.get(name) for name in stage.needs]

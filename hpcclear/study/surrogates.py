@@ -43,13 +43,7 @@ def domain(run: StudyRun, names: Sequence[str]) -> Box:
 
 
 def method_of(scene: Scene) -> Method:
-    """The kind of surrogate that a study requests.
-
-    Raises
-    ------
-    InputError
-        What its scene names has no `fit` or no `predict`.
-    """
+    """The kind of surrogate that a study requests. Raises InputError if what its scene names has no `fit` or no `predict`."""
     settings = scene.required_study.surrogate
     if settings.model is not None and not SURROGATES.is_ours(settings.model):
         source = SURROGATES.get(settings.model, scene.plugin_texts)
@@ -59,13 +53,8 @@ def method_of(scene: Scene) -> Method:
 
 
 def fit_all(run: StudyRun) -> Result:
-    """Fit every model of the study (method: `hpcclear.statistics.surrogate.subintervals`), and check each.
-
-    Returns
-    -------
-    dict of arrays
-        For `models_of` and `write`.
-    """
+    """Fit every model of the study (method: `hpcclear.statistics.surrogate.subintervals`), and check each: arrays for
+    `models_of` and `write`."""
     result: Result = {}
     method = method_of(run.scene)
     for k, names in enumerate(run.study.models):
@@ -103,13 +92,8 @@ def _tests(study: Study) -> int:
 
 
 def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]:
-    """The models in a result of `fit_all` (arrays of any shape, by name), in the order of the study's.
-
-    Raises
-    ------
-    InputError
-        A model that is fitted again comes out as another one.
-    """
+    """The models in a result of `fit_all` (arrays of any shape, by name), in the order of the study's. Raises InputError if
+    a model that is fitted again comes out as another one."""
     found: list[Piecewise] = []
     method = method_of(scene)
     while arrays := _named(result, f"model{len(found)}_"):
@@ -129,14 +113,8 @@ def _named(result: Mapping[str, np.ndarray], start: str) -> Result:
 
 
 def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
-    """Surrogates of responses besides f that cases require (`Study.further`), of the designs simulated so far in the inputs of
-    the model that is searched, as it is of f.
-
-    Raises
-    ------
-    InputError
-        Nearly all of these simulations failed.
-    """
+    """Surrogates of responses besides f that cases require (`Study.further`), of the designs simulated so far in the inputs
+    of the model that is searched, as it is of f. Raises InputError if nearly all of these simulations failed."""
     study, names = run.study, run.study.models[-1]
     if not study.further:
         return []

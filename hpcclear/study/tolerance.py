@@ -107,14 +107,8 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals.
-
-    Returns
-    -------
-    dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): bias of mean and standard deviation by the tolerance, relative,
-        and its standard error.
-    """
+    """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals; besides ``tolerance`` and
+    ``tolerance_error``, (n, 2): bias of mean and standard deviation by the tolerance, relative, and its standard error."""
     made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)
     loads = run.study.load_cases
     others = run.simulations.next // (1 if loads is None else len(loads.options or ()))

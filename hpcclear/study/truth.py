@@ -83,12 +83,7 @@ def made(
 
     Only those that decide are simulated further: in each objective the least is known as accurately as the study (or `wanted`
     of each design) requires, and others are simulated as long as choosing it may lose more than `LOST`; as if those `without`
-    which it has to go were not there.
-
-    Raises
-    ------
-    InputError
-        If all simulations fail.
+    which it has to go were not there. Raises InputError if all simulations fail.
     """
     settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
@@ -215,9 +210,7 @@ def nothing(run: StudyRun) -> Array:
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
     """Results of designs from their simulations, shape (2, replicates, values) each.
 
-    Returns
-    -------
-    dict of arrays over the designs
+    Arrays over the designs:
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,

@@ -286,18 +286,10 @@ def write(
 ) -> None:
     """Write verification.nc.
 
-    Parameters
-    ----------
-    true : dict of arrays, shape (n, ...)
-        Of `hpcclear.study.tolerance.verified`, over the same designs.
-    model : Piecewise
-        The surrogate that was searched.
-    remarks : sequence of str
-        What a reader should know, a sentence each.
-    printed : mapping of str to array, shape (n,)
-        ``mean`` and ``deviation`` of the same designs in a publication, to stand beside ours.
-    over_life : mapping of str to array, shape (n,)
-        Of `hpcclear.study.lives.of_designs`; empty where nothing wears.
+    `true`: arrays (n, ...) of `hpcclear.study.tolerance.verified`, over the same designs; `model`: the surrogate that was
+    searched; `remarks`: what a reader should know, a sentence each; `printed`: ``mean`` and ``deviation`` (n,) of the same
+    designs in a publication, to stand beside ours; `over_life`: (n,) of `hpcclear.study.lives.of_designs`, empty where
+    nothing wears.
     """
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)

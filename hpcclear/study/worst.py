@@ -55,13 +55,10 @@ def unbounded(law: quantiles.Quantiles) -> bool:
 
 
 def of_designs(run: StudyRun, choices: Sequence[Choice]) -> Result:
-    """Search the worst case of designs.
+    """Search the worst case of designs, arrays over these.
 
-    Returns
-    -------
-    dict of arrays over the designs
-        ``worst`` and ``worst_corner``: the largest f, and that at a corner; ``searched_at`` (n, inputs): where, as the values
-        of the random inputs, SI, NaN for those of other cases; ``tried``: simulations. NaN or 0 of designs that are not shown.
+    ``worst`` and ``worst_corner``: the largest f, and that at a corner; ``searched_at`` (n, inputs): where, as the values
+    of the random inputs, SI, NaN for those of other cases; ``tried``: simulations. NaN or 0 of designs that are not shown.
     """
     names = inputs_of(run)
     result: Result = {name: np.full(len(choices), np.nan) for name in ("worst", "worst_corner")}

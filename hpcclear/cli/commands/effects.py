@@ -80,13 +80,7 @@ def run(
 
 
 def tolerance_of(words: str) -> float:
-    """A relative change: 0.01, or 1%.
-
-    Raises
-    ------
-    InputError
-        If it is no number.
-    """
+    """A relative change: 0.01, or 1%. Raises InputError if it is no number."""
     try:
         return float(words)
     except ValueError:

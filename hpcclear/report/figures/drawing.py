@@ -44,12 +44,8 @@ def draw(
 ) -> str:
     """Draw the linkage where `poses` has its bodies; return what is said of its scale.
 
-    Parameters
-    ----------
-    changed : mapping of str to list of str, optional
-        What differs from another design, in lines, by the names of bodies and joints; these are coloured, others grey.
-    before : tuple, optional
-        Scene and poses of that design, whose outline is drawn beneath.
+    `changed`: what differs from another design, in lines, by the names of bodies and joints, which are coloured, others
+    grey; `before`: scene and poses of that design, whose outline is drawn beneath.
     """
     mechanism = scene.linkage
     placed = Placed(mechanism, poses)

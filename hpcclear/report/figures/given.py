@@ -11,13 +11,8 @@ from hpcclear.results.names import DESIGN_VARIABLES, KINDS
 
 
 def taken(kind: str, given: Any) -> Any:
-    """Return results for what is given to a figure's argument, which is called as the `kind` of its file.
-
-    Raises
-    ------
-    InputError
-        Arrays that are not those of a file of the kind.
-    """
+    """Return results for what is given to a figure's argument, which is called as the `kind` of its file. Raises InputError
+    for arrays that are not those of a file of the kind."""
     if hasattr(given, "data_vars"):
         return Results.of(given)
     if not isinstance(given, Mapping) or kind not in (*KINDS, "responses"):

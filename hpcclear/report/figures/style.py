@@ -145,13 +145,8 @@ def across() -> float:
 
 
 def page(height: float, width: float | None = None) -> "Figure":
-    """An empty figure of a height and a width in mm, by default a column's, or as a user wants it.
-
-    Raises
-    ------
-    InputError
-        The caller gave axes.
-    """
+    """An empty figure of a height and a width in mm, by default a column's, or as a user wants it. Raises InputError if the
+    caller gave axes."""
     matplotlib()
     if (given := _given.get()) is not None:
         reason = "this figure has a layout of its own"
@@ -172,13 +167,8 @@ def page(height: float, width: float | None = None) -> "Figure":
 def mosaic(
     cells: Sequence[Sequence[str]], height: float, **options: Any
 ) -> "tuple[Figure, dict[str, Axes]]":
-    """A page of panels by their names (``"."`` is an empty place), or the caller's axes in the order of the names.
-
-    Raises
-    ------
-    InputError
-        If the caller gave another number of axes.
-    """
+    """A page of panels by their names (``"."`` is an empty place), or the caller's axes in the order of the names. Raises
+    InputError if the caller gave another number of axes."""
 
     def make(figure: "Figure", count: int) -> "Panels":
         empty = {f"{k} .": "." for k in range(count)}
@@ -192,13 +182,8 @@ def mosaic(
 
 
 def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`.
-
-    Raises
-    ------
-    InputError
-        If the caller gave another number of axes.
-    """
+    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`. Raises
+    InputError if the caller gave another number of axes."""
 
     def make(figure: "Figure", count: int) -> "Panels":
         shared = {"sharey": "row"} if count > 1 else {}
@@ -312,13 +297,8 @@ def _in_columns(make: "Callable[..., Legend]", most: int, room: float) -> "Legen
 
 
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
-    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes.
-
-    Raises
-    ------
-    InputError
-        Its labels do not fit the size that a user wants.
-    """
+    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes. Raises InputError if its labels
+    do not fit the size that a user wants."""
     buffer, user = io.BytesIO(), _users.get(figure, Printing())
     engine, dots = figure.get_layout_engine(), figure.get_dpi()
     none = {"backend": "agg", "figure.autolayout": False, "figure.constrained_layout.use": False}

@@ -86,13 +86,7 @@ RC: dict[str, Any] = {
 
 
 def matplotlib() -> Any:
-    """The matplotlib module.
-
-    Raises
-    ------
-    InputError
-        It is not installed; the message names the extra that brings it.
-    """
+    """The matplotlib module. Raises InputError if it is not installed; the message names the extra that brings it."""
     try:
         import matplotlib as module
     except ModuleNotFoundError:

@@ -61,13 +61,8 @@ class Content:
 
 
 def read(*places: str | Path) -> Content:
-    """Read every result file of a directory and of its folder ``responses``, or the files that are named.
-
-    Raises
-    ------
-    InputError
-        There is no such directory or no result in it, or a file that is named is no result.
-    """
+    """Read every result file of a directory and of its folder ``responses``, or the files that are named. Raises InputError
+    if there is no such directory or no result in it, or a file that is named is no result."""
     chosen = [Path(place) for place in places]
     whole = len(chosen) == 1 and not chosen[0].is_file()
     place = chosen[0] if whole else chosen[0].parent

@@ -19,10 +19,8 @@ Made = TypeVar("Made")
 def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | None:
     """What `make` returns; None if it fails or takes too long, and why as a sentence in `troubles`.
 
-    Raises
-    ------
-    InputError, StorageError, OSError
-        What the user can mend, and what the machine refuses: that is not the content's fault.
+    Raises what the user can mend (InputError) and what the machine refuses (StorageError, OSError): not the content's
+    fault.
     """
     try:
         with time_limit(LONGEST):

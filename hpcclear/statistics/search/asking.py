@@ -72,13 +72,7 @@ class Search(Protocol):
 
 
 def made(maker: Callable[[SearchTask], Any], name: str, task: SearchTask) -> Search:
-    """The search of a name.
-
-    Raises
-    ------
-    InputError
-        It cannot be made of a task, or has no `ask` or no `tell`.
-    """
+    """The search of a name. Raises InputError if it cannot be made of a task, or has no `ask` or no `tell`."""
     try:
         search = maker(task)
     except InputError:

@@ -89,13 +89,8 @@ def readings(scene: Scene) -> list[Interpretation]:
 
 
 def evaluate(run: StudyRun) -> Result:
-    """Mean, standard deviation and f at the smallest clearance for each reading and printed design.
-
-    Returns
-    -------
-    dict of arrays
-        The data variables of readings.nc, of shape (readings, designs).
-    """
+    """Mean, standard deviation and f at the smallest clearance for each reading and printed design: the data variables of
+    readings.nc, (readings, designs)."""
     rows = [
         run.part(f"{STAGE}-{k}", _row, reading)["row"]
         for k, reading in enumerate(readings(run.scene))
