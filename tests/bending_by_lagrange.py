@@ -17,10 +17,7 @@ def share_of(mass, inertia, length, center):
     def left(m):
         about_a = inertia + mass * center**2 - m * length**2 / 3
         return np.array(
-            [
-                [mass - m, mass * center - m * length / 2],
-                [mass * center - m * length / 2, about_a],
-            ]
+            [[mass - m, mass * center - m * length / 2], [mass * center - m * length / 2, about_a]]
         )
 
     def least(m):

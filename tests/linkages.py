@@ -197,10 +197,7 @@ def three_rrr(*open_pins):
     for k in range(3):
         angle = 2.1 * k
         ground[f"g{k}"] = (radius * math.cos(angle), radius * math.sin(angle))
-        bodies += [
-            bar(f"arm{k}", 0.12, 0.2, angle + 2.2),
-            bar(f"leg{k}", 0.14, 0.15, angle + 3.9),
-        ]
+        bodies += [bar(f"arm{k}", 0.12, 0.2, angle + 2.2), bar(f"leg{k}", 0.14, 0.15, angle + 3.9)]
         joints += pins(
             open_pins,
             (f"base{k}", f"arm{k}.a", f"ground.g{k}"),

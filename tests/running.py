@@ -180,10 +180,7 @@ def energy(scene: Scene, par, q, v, active) -> float:
     )
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     for k, (name, e) in enumerate(
-        (
-            ("crank_rod", pin - near_end),
-            ("rod_slider", nine[X3] + 1j * nine[Y3] - far_end),
-        )
+        (("crank_rod", pin - near_end), ("rod_slider", nine[X3] + 1j * nine[Y3] - far_end))
     ):
         base = at.JOINTS[k].block
         if name in scene.clearance_joints():

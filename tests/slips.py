@@ -152,10 +152,7 @@ def slider_crank(dice: random.Random, turns: bool) -> Content:
         "small": joint(dice, "slider.pin", "rod.b"),
         "guide": {"kind": "slide", "point": "slider.pin", "line": "ground.line", "angle": f"{tilt:.4f} deg"},
     }  # fmt: skip
-    places = {
-        "o": [0.0, 0.0],
-        "line": [mm(-offset * math.sin(turn)), mm(offset * math.cos(turn))],
-    }
+    places = {"o": [0.0, 0.0], "line": [mm(-offset * math.sin(turn)), mm(offset * math.cos(turn))]}
     return scene(bodies, places, joints, drive(dice))
 
 

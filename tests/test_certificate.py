@@ -27,13 +27,7 @@ from hpcclear.ensemble.certificate import (
 )
 from hpcclear.ensemble.trial import Drawn, Trial
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.figures.effects import (
-    label,
-    named,
-    saving,
-    seconds_of,
-    statements,
-)
+from hpcclear.report.figures.effects import label, named, saving, seconds_of, statements
 from hpcclear.report.html.sections import _changed
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint

@@ -17,13 +17,7 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.lock import Holder, Lock
-from hpcclear.base.outcome import (
-    Status,
-    failed,
-    recast,
-    record_type,
-    unknown,
-)
+from hpcclear.base.outcome import Status, failed, recast, record_type, unknown
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}

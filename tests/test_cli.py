@@ -170,10 +170,7 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
             "longer than the crank",
         ),
         (["simulate", "jobs/slider_crank.toml"], "--output"),
-        (
-            ["simulate", "jobs/slider_crank.toml", "-o", "/proc/no/such/x.nc"],
-            "/proc/no/such",
-        ),
+        (["simulate", "jobs/slider_crank.toml", "-o", "/proc/no/such/x.nc"], "/proc/no/such"),
         (["sample", "jobs/slider_crank.toml", "-o", "x.nc"], "study"),
         (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--time-limit", "nan"], "--time-limit"),
         (
@@ -186,10 +183,7 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
             "-interval",
         ),
         (["frobnicate"], "No such command"),
-        (
-            ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--points", "README.md"],
-            "README.md",
-        ),
+        (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--points", "README.md"], "README.md"),
     ],
 )
 def test_bad_input_is_one_message_and_exit_code_2(words, fragment):

@@ -250,9 +250,7 @@ def refuses(folder: Path, content: bytes) -> str:
 
 
 DAMAGE = settings(
-    max_examples=300,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

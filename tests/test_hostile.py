@@ -20,11 +20,7 @@ from click.testing import CliRunner, Result
 from commands import CHEAP, MPIEXEC, ROOT, SCENE, finish, limited, overrides, run, sample, start
 from patience import crowded
 
-from hpcclear.base.errors import (
-    LEAST_ADDRESS_SPACE,
-    LEAST_BESIDE_OTHERS,
-    InputError,
-)
+from hpcclear.base.errors import LEAST_ADDRESS_SPACE, LEAST_BESIDE_OTHERS, InputError
 from hpcclear.cli import cli
 from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.report.html import guard

@@ -16,10 +16,7 @@ SCENE = load_scene(JOBS / "hunt_crossley.toml").with_(
     {
         "study": {
             "samples": 512,
-            "variables": {
-                "m2": {"range": [0.105, 0.42]},
-                "C": {"range": ["0.3 mm", "1 mm"]},
-            },
+            "variables": {"m2": {"range": [0.105, 0.42]}, "C": {"range": ["0.3 mm", "1 mm"]}},
         },
         "numerics.transient_revolutions": 1,
         "numerics.averaged_revolutions": 1,

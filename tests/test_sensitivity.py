@@ -183,8 +183,7 @@ def test_selection_compares_effects_over_the_interval_not_slopes() -> None:
     np.testing.assert_allclose(chosen.effect, [[6e-5, 4e-4, 1.2e-7]])
     assert chosen.selected == ("I2", "m2")
     np.testing.assert_array_equal(
-        chosen.influence,
-        [[Influence.INFLUENTIAL, Influence.INFLUENTIAL, Influence.NEGLIGIBLE]],
+        chosen.influence, [[Influence.INFLUENTIAL, Influence.INFLUENTIAL, Influence.NEGLIGIBLE]]
     )
 
 

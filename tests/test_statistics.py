@@ -150,11 +150,7 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("versions", "numba 0.1"),
-        ("processor", "another one"),
-    ],
+    ("name", "value"), [("versions", "numba 0.1"), ("processor", "another one")]
 )
 def test_statistics_go_on_only_with_the_same_versions_and_processor(
     tmp_path, monkeypatch, name, value

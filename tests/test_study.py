@@ -22,12 +22,7 @@ from hpcclear.report.merit import recommended
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.scene import load_scene
 from hpcclear.statistics.surrogate.stored import models_in
-from hpcclear.study import (
-    chaos,
-    extent,
-    responses,
-    run_study,
-)
+from hpcclear.study import chaos, extent, responses, run_study
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.claims import ResponseEvidence
 from hpcclear.study.paper.printed import printed_designs

@@ -150,10 +150,7 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
 
 
 @only_sample
-@pytest.mark.parametrize(
-    ("case", "rank"),
-    CASES,
-)
+@pytest.mark.parametrize(("case", "rank"), CASES)
 def test_a_program_error_at_any_stage_is_reported_once_and_work_is_saved(
     place, undisturbed, case, rank
 ):

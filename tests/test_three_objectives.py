@@ -195,12 +195,7 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     part = designs.designs(content)
     assert part is not None
     table = next(one for one in part if not isinstance(one, str))
-    assert table.header[-4:] == [
-        "objective 1",
-        "objective 2",
-        "objective 3",
-        "constraints",
-    ]
+    assert table.header[-4:] == ["objective 1", "objective 2", "objective 3", "constraints"]
     assert any(row[0] == f"lowest {THIRD} (gamma)" for row in table.rows)
 
 

@@ -10,13 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.accuracy.looked_at import QUANTITIES, quantities_of
-from hpcclear.accuracy.methods import (
-    kernel_method,
-    methods_of,
-    solve_turn,
-    systems,
-    timed,
-)
+from hpcclear.accuracy.methods import kernel_method, methods_of, solve_turn, systems, timed
 from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array
 from hpcclear.report.html.costs import MARGIN

@@ -98,8 +98,7 @@ class Panels:
         """Error of one revolution against time, for every method."""
         with self.ranks.stage("integration"):
             self.panel(
-                "integration",
-                lambda: integration.measure(self.scene, self.profile, self.notify),
+                "integration", lambda: integration.measure(self.scene, self.profile, self.notify)
             )
 
     def add_averaging(self) -> None:

@@ -44,10 +44,7 @@ def _variables(scene: Scene) -> dict[str, object]:
     """Rod mass, slider mass and the clearances, each about the scene's value; of a linkage, the mass of one body."""
     if scene.template is None:
         gaps = [path for path in scene.numeric_paths() if path.endswith(".clearance")]
-        paths = {
-            "mass": [mass_of(scene)],
-            **{f"C{k}": [path] for k, path in enumerate(gaps, 1)},
-        }
+        paths = {"mass": [mass_of(scene)], **{f"C{k}": [path] for k, path in enumerate(gaps, 1)}}
         return {name: {"paths": one, **_about(scene, one[0])} for name, one in paths.items()}
     known = set(scene.numeric_paths())
     clearances = {scene.number(path) for path in SHORT_NAMES["C"] if path in known}

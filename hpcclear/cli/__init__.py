@@ -16,13 +16,7 @@ from collections.abc import Iterator, Sequence
 import click
 
 from hpcclear import __version__
-from hpcclear.base.errors import (
-    InputError,
-    LimitError,
-    StorageError,
-    check_address_space,
-    mendable,
-)
+from hpcclear.base.errors import InputError, LimitError, StorageError, check_address_space, mendable
 from hpcclear.base.remarks import listen
 from hpcclear.cli import commands
 from hpcclear.cli.options import GROUPS, Command, is_root, say

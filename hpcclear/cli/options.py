@@ -97,9 +97,7 @@ INTERVAL = click.option(
     help="Save finished samples this often; a crash loses about this much simulation time.",
 )
 POINTS = click.option(
-    "--points",
-    type=PATH,
-    help="CSV table of designs, used instead of the designs of the study.",
+    "--points", type=PATH, help="CSV table of designs, used instead of the designs of the study."
 )
 PROGRESS = click.option(
     "--progress",
@@ -153,12 +151,7 @@ GATHERED: dict[str, Any] = {"written": Written, "how": How}
 """Arguments of commands, and what they are gathered of."""
 
 
-GROUPS = {
-    "start": "Start",
-    "compute": "Compute",
-    "look": "Look at results",
-    "keep": "Keep results",
-}
+GROUPS = {"start": "Start", "compute": "Compute", "look": "Look at results", "keep": "Keep results"}
 """Groups of commands, and their headings in `hpcclear --help`."""
 
 

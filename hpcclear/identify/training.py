@@ -10,13 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.identify.inputs import Inputs, design
-from hpcclear.identify.signals import (
-    INSTANTS,
-    ORDERS,
-    PARTS,
-    Spectrum,
-    spectra,
-)
+from hpcclear.identify.signals import INSTANTS, ORDERS, PARTS, Spectrum, spectra
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style, announce
 from hpcclear.results.checkpoint import Checkpoint

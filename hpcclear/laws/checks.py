@@ -19,14 +19,7 @@ from hpcclear.laws.declared import (
     Law,
     Parameter,
 )
-from hpcclear.laws.numbers import (
-    elastic_at,
-    evaluate,
-    force_of,
-    sample_numbers,
-    stored,
-    with_words,
-)
+from hpcclear.laws.numbers import elastic_at, evaluate, force_of, sample_numbers, stored, with_words
 from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import text_of
 from hpcclear.laws.translate import LawError

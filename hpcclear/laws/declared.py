@@ -31,12 +31,7 @@ JOINT = {
 clearance, length of the bearing (NaN where the scene gives none), and Dundurs' parameters of journal against bearing."""
 
 VARYING = {
-    "contact": {
-        "depth": "m",
-        "rate": "m/s",
-        "impact_speed": "m/s",
-        "inverse_impact_speed": "s/m",
-    },
+    "contact": {"depth": "m", "rate": "m/s", "impact_speed": "m/s", "inverse_impact_speed": "s/m"},
     "friction": {"speed": "m/s", "force": "N", "deflection": "m", "deflection_rate": "m/s"},
 }
 """What varies from instant to instant, by the kind of law, with units: penetration, its rate, the rate at the start of this

@@ -112,7 +112,4 @@ def _steps(of: Recommended) -> Iterator[str]:
         yield f"study.verification.samples={10 * int(best['samples'])} for confidence intervals a third as wide"
 
 
-PARTS = (
-    LinesOf(10, _head, _steps),
-    LinesOf(90, _sure),
-)
+PARTS = (LinesOf(10, _head, _steps), LinesOf(90, _sure))

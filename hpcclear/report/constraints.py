@@ -11,11 +11,7 @@ from hpcclear.results.content import Results, each
 ABSENT = 3
 """Code of ``constraint_verdict`` where a case has fewer constraints than another."""
 
-WORDS = {
-    Verdict.FAILS: "violated",
-    Verdict.UNDECIDED: "undecided",
-    Verdict.HOLDS: "satisfied",
-}
+WORDS = {Verdict.FAILS: "violated", Verdict.UNDECIDED: "undecided", Verdict.HOLDS: "satisfied"}
 
 OPEN = "the integration tolerance leaves it open"
 """Said of a constraint that no number of simulations would decide."""

@@ -83,10 +83,7 @@ def read_samples(paths: Sequence[str | Path]) -> dict[str, Results]:
 
 
 def statistics(
-    every: Mapping[str, Results],
-    output: str | Path,
-    lines: spread.Lines,
-    units: Sequence[str] = (),
+    every: Mapping[str, Results], output: str | Path, lines: spread.Lines, units: Sequence[str] = ()
 ) -> "DataFrame":
     """Write the statistics of several samples: a row for each, and for each file columns of value and interval, as numbers.
 

@@ -30,12 +30,7 @@ from hpcclear.base.outcome import (
 from hpcclear.results import netcdf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.faults import fault_of
-from hpcclear.results.names import (
-    DESIGN_VARIABLES,
-    KINDS,
-    LIMIT,
-    ROLE,
-)
+from hpcclear.results.names import DESIGN_VARIABLES, KINDS, LIMIT, ROLE
 from hpcclear.results.rows import FileVariable, ResultKind
 
 CONVENTIONS = "CF-1.11"

@@ -9,14 +9,7 @@ from pydantic import Field
 
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
-from hpcclear.scene.fields import (
-    Angle,
-    Count,
-    Quantity,
-    Table,
-    check_one_of,
-    invalid,
-)
+from hpcclear.scene.fields import Angle, Count, Quantity, Table, check_one_of, invalid
 
 Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
@@ -212,7 +205,7 @@ class CrankTorque(Table):
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
     elsewhere: ClassVar = {
-        "speed": ("is a result of a torque", 'Give initial_speed, or kind = "constant-speed"'),
+        "speed": ("is a result of a torque", 'Give initial_speed, or kind = "constant-speed"')
     }
 
     def _check(self) -> None:

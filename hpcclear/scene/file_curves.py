@@ -63,7 +63,7 @@ class FileCurve(Table):
     """Whether the angles of the file count clockwise."""
 
     elsewhere: ClassVar = {
-        "column": ("belongs to measured values of an input", 'Write pressure = "heading [bar]"'),
+        "column": ("belongs to measured values of an input", 'Write pressure = "heading [bar]"')
     }
 
     def _check(self) -> None:

@@ -184,12 +184,7 @@ def _of_options(options: Sequence[float], place: Array) -> Array:
 
 
 def _by_designs(
-    study: Study,
-    row: RandomInput,
-    names: Sequence[str],
-    values: Array,
-    place: Array,
-    centre: float,
+    study: Study, row: RandomInput, names: Sequence[str], values: Array, place: Array, centre: float
 ) -> Array:
     """A random input at probabilities (n,) where every row of `values` (n, d) is a design of its own."""
     drivers = [name for name in study.drivers(row) if name in names]

@@ -54,13 +54,7 @@ class Scene(ConsistentTables):
         about = {f"about_{name}": str(text) for name, text in words.items()}
         cited = {"references": self.references} if self.references else {}
         read = {"readings": json.dumps(self._readings)} if self._readings else {}
-        return {
-            **cited,
-            **read,
-            "scene": self.text,
-            "scene_hash": self.hash,
-            **about,
-        }
+        return {**cited, **read, "scene": self.text, "scene_hash": self.hash, **about}
 
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""

@@ -12,13 +12,7 @@ from pydantic import Field, model_validator
 from hpcclear.base.written import shown
 from hpcclear.scene.contacts.guide import Guide, PlanarSlide
 from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
-from hpcclear.scene.driving import (
-    CrankSpeed,
-    CrankTorque,
-    PlanarDrive,
-    PlanarSpeed,
-    PlanarTorque,
-)
+from hpcclear.scene.driving import CrankSpeed, CrankTorque, PlanarDrive, PlanarSpeed, PlanarTorque
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import (
     Content,
@@ -32,13 +26,7 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.joints import IdealPinFriction, Material, Materials, PlanarRevolute
 from hpcclear.scene.loads.force import ForceLoad
-from hpcclear.scene.planar import (
-    BarBending,
-    Ground,
-    Planar,
-    PlanarBody,
-    PlanarJoint,
-)
+from hpcclear.scene.planar import BarBending, Ground, Planar, PlanarBody, PlanarJoint
 
 
 class Link(Table):

@@ -25,16 +25,7 @@ from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import (
-    extent,
-    optimisation,
-    rare,
-    search,
-    stages,
-    surrogates,
-    tolerance,
-    truth,
-)
+from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, tolerance, truth
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 

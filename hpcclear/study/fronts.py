@@ -56,11 +56,7 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
     for choice in verified:
         if choice.place is not None:
             data["verified"][(cases.index(choice.case), *choice.place)] = 1
-    coords = {
-        "case": np.array(cases),
-        "run": np.arange(shape[1]),
-        "solution": np.arange(solutions),
-    }
+    coords = {"case": np.array(cases), "run": np.arange(shape[1]), "solution": np.arange(solutions)}
     units = {name: run.study.variable(name).unit or "1" for name in used}
     content = dataset.dataset("front", coords, data, None, units, run.scene.objective, run.words)
     run.write(content)

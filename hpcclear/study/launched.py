@@ -17,14 +17,7 @@ DONE = "results in "
 """What the line begins with that names the directory of the results."""
 
 
-def launch(
-    scene: Scene,
-    directory: Path,
-    ranks: int,
-    *,
-    fresh: bool,
-    progress_style: str,
-) -> Path:
+def launch(scene: Scene, directory: Path, ranks: int, *, fresh: bool, progress_style: str) -> Path:
     """Run a study under ``mpiexec -n RANKS``; what it prints goes to standard error as it comes. Returns the directory of
     the results.
 

@@ -17,10 +17,7 @@ from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.study import loads as loading
 
-SHOWN = {
-    "pairs": "runs at two tolerances",
-    "chaos": "perturbed runs",
-}
+SHOWN = {"pairs": "runs at two tolerances", "chaos": "perturbed runs"}
 """Names of stages on the progress display, where the stage has another one."""
 
 

@@ -20,11 +20,7 @@ from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
 from hpcclear.statistics.surrogate.regression import Regression, RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import arrays_of, models_in, rows_of
-from hpcclear.statistics.surrogate.subintervals import (
-    Method,
-    SubintervalSettings,
-    fit_subintervals,
-)
+from hpcclear.statistics.surrogate.subintervals import Method, SubintervalSettings, fit_subintervals
 from hpcclear.study.run import Result, StudyRun
 
 STAGE = "kriging"

@@ -10,11 +10,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import (
-    Estimate,
-    moments,
-    quantile,
-)
+from hpcclear.statistics.random.replicates import Estimate, moments, quantile
 from hpcclear.study import contest, contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun

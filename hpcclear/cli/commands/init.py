@@ -77,8 +77,7 @@ def run(
         _copy_jobs(file)
     else:
         _write_starter(
-            file,
-            "four_stroke" if four_stroke else "compressor" if compressor else "starter",
+            file, "four_stroke" if four_stroke else "compressor" if compressor else "starter"
         )
     return Exit.DONE
 

@@ -14,11 +14,7 @@ from hpcclear.ranks.stopping import Exit
 @cli.LIMIT
 @cli.PROGRESS
 def run(
-    written: cli.Written,
-    output: Path,
-    fresh: bool,
-    time_limit: float | None,
-    progress: Any,
+    written: cli.Written, output: Path, fresh: bool, time_limit: float | None, progress: Any
 ) -> int:
     """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 

@@ -115,8 +115,7 @@ EXPONENT = OF_JOINT(
     "of the depth in the normal force; this and the next are what peaks between steps are found by"
 )
 DAMPING = OF_JOINT(
-    "factor of the rate in the normal force, or of the rate over the impact speed",
-    "s/m",
+    "factor of the rate in the normal force, or of the rate over the impact speed", "s/m"
 )
 DEEPEST_VALID = OF_JOINT("depth from where on a result is flagged", "m")
 INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction changes most", "s/m")

@@ -12,14 +12,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight, uncentred
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Number,
-    Pair,
-    as_complex,
-    places_of,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, Number, Pair, as_complex, places_of, split
 from hpcclear.dynamics.linkage.trees import forest
 
 MOST_STEPS = 40

@@ -58,9 +58,7 @@ def _levels(
     panel.fill_between(band, least, upper.to_numpy()[there], color=colour, alpha=0.25, lw=0.0)
 
 
-def _forces(
-    response: Results,
-) -> dict[str, tuple[Variable, Variable, Variable, Variable]]:
+def _forces(response: Results) -> dict[str, tuple[Variable, Variable, Variable, Variable]]:
     """Level, ends of its interval, and orders, of the force on the frame and of each contact force that is not 0."""
     ends = ("level", "level_lower", "level_upper", "orders")
     found = {}

@@ -52,10 +52,7 @@ def names_in(verified: Results) -> list[str]:
 
 
 def table_of(
-    verified: Results,
-    shown: Mapping[str, str],
-    columns: Sequence[tuple[str, str]],
-    caption: str,
+    verified: Results, shown: Mapping[str, str], columns: Sequence[tuple[str, str]], caption: str
 ) -> PageTable:
     """A row for each design, by its name and what it is called; each column in one unit, empty ones left out."""
     chosen = verified.sel(design=list(shown))

@@ -12,11 +12,7 @@ from hpcclear.report.merit import goals_of, leading_goals, recommended
 from hpcclear.report.screens.study import simulated
 from hpcclear.results.content import Results
 
-_LEGEND = {
-    "design": "simulated",
-    "original": "baseline design",
-    "printed": "design of the paper",
-}
+_LEGEND = {"design": "simulated", "original": "baseline design", "printed": "design of the paper"}
 _USUAL = ("mean of f", "standard deviation of f")
 _WORDS = {"mean": "mean", "deviation": "standard deviation"}
 FRAMES = 180  # of a revolution

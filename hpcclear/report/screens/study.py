@@ -284,11 +284,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
         for one in fits.warnings(kind, of.files.get(kind))
     ]
     if poor:
-        yield Trust(
-            Level.AMBER,
-            f"{len(poor)} surrogate fits are poor",
-            "sensitivities",
-        )
+        yield Trust(Level.AMBER, f"{len(poor)} surrogate fits are poor", "sensitivities")
 
 
 def _accuracy(best: Results) -> Trust:
