@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
+from planar_scenes import planar_scene
 from scipy.optimize import brentq
 
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 
 MASS, RADIUS, LENGTH, CLEARANCE, VISCOSITY = 5.0, 0.02, 0.02, 1e-4, 0.02
 STEEL = {"youngs_modulus": 2.06e11, "poisson_ratio": 0.3}
@@ -27,28 +28,13 @@ def rotor(
     }
     body = {"mass": MASS, "inertia": 1e-3, "points": {"center_of_journal": [0.0, 0.0]}}
     motor = {"kind": "constant-speed", "body": "rotor", "speed": speed}
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": {"rotor": body},
-                "joints": {"bearing": bearing},
-                "drives": {"motor": motor},
-            },
-            "effects": {
-                "gravity": load / MASS,
-                "contact": {"law": "hunt-crossley", "damping": 0.4},
-            },
-            "numerics": {
-                "rtol": 1e-8,
-                "transient_revolutions": 0,
-                "averaged_revolutions": turns,
-                "energy": True,
-            },
-            "output": {"instants_per_revolution": 32},
-        }
-    )
+    numerics = {"rtol": 1e-8, "transient_revolutions": 0, "averaged_revolutions": turns}
+    return planar_scene(
+        {"rotor": body}, {"bearing": bearing}, {"motor": motor},
+        effects={"gravity": load / MASS, "contact": {"law": "hunt-crossley", "damping": 0.4}},
+        numerics={**numerics, "energy": True},
+        output={"instants_per_revolution": 32},
+    )  # fmt: skip
 
 
 def loads(model: str, e: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import pytest
 import running
 from bending_by_lagrange import IdealSliderCrank, Rod
 from linkages import constant_speed, loose_pin, revolute, slide, torque_drive
+from planar_scenes import planar_scene
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
@@ -245,28 +246,22 @@ def held_bar(
     speed = 2 * np.pi / seconds if speed is None else speed
     bending = {"stiffness": SIMEON, "modes": modes, "damping": damping}
     loads = {"push": {"kind": "force", "place": "block.pin", "force": [-push, 0.0]}}
-    return load_scene(
+    return planar_scene(
         {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": {
-                    "disc": {"mass": 1.0, "inertia": 1e-6, "points": {"o": [0, 0]}},
-                    "bar": PLANAR | {"bending": bending},
-                    "block": {"mass": block, "points": {"pin": [0, 0]}},
-                },
-                "joints": {
-                    "axis": {"kind": "revolute", "journal": "disc.o", "bearing": "ground.o"},
-                    "left": {"kind": "revolute", "journal": "bar.a", "bearing": on},
-                    "guide": {"kind": "slide", "point": "block.pin", "line": on},
-                    "right": {"kind": "revolute", "journal": "block.pin", "bearing": "bar.b"},
-                },
-                "drives": {"motor": {"kind": "constant-speed", "body": "disc", "speed": speed}},
-                "loads": loads if push else {},
-            },
-            "effects": {"gravity": gravity},
-            "numerics": {"rtol": 1e-11, "transient_revolutions": 0, "averaged_revolutions": 1},
-        }
+            "disc": {"mass": 1.0, "inertia": 1e-6, "points": {"o": [0, 0]}},
+            "bar": PLANAR | {"bending": bending},
+            "block": {"mass": block, "points": {"pin": [0, 0]}},
+        },
+        {
+            "axis": {"kind": "revolute", "journal": "disc.o", "bearing": "ground.o"},
+            "left": {"kind": "revolute", "journal": "bar.a", "bearing": on},
+            "guide": {"kind": "slide", "point": "block.pin", "line": on},
+            "right": {"kind": "revolute", "journal": "block.pin", "bearing": "bar.b"},
+        },
+        {"motor": {"kind": "constant-speed", "body": "disc", "speed": speed}},
+        loads=loads if push else {},
+        effects={"gravity": gravity},
+        numerics={"rtol": 1e-11, "transient_revolutions": 0, "averaged_revolutions": 1},
     )
 
 

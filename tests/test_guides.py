@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import rigid_slider as rigid
 from dense_linkage import Contact, Dense, comes_as, start_of
+from planar_scenes import planar_scene
 from scipy.optimize import brentq
 
 from hpcclear import load_scene, simulate
@@ -188,16 +189,7 @@ def random_scene(seed):
         "materials": {part: {"youngs_modulus": "2 GPa", "poisson_ratio": 0.4} for part in ("bearing", "journal")},
     }  # fmt: skip
     drive = {"kind": "constant-speed", "body": "crank", "speed": rng.uniform(60.0, 120.0)}
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar", "bodies": bodies, "joints": joints, "ground": {"points": ground},
-                "drives": {"motor": drive},
-            },
-            **LAWS,
-        }
-    )  # fmt: skip
+    return planar_scene(bodies, joints, {"motor": drive}, ground=ground, **LAWS)
 
 
 def dense_through_contact(scene, last):

@@ -8,11 +8,12 @@ import math
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 from scipy.interpolate import PchipInterpolator
 from test_linkage_scenes import slider_crank_pair
 from test_rest import REST
 
-from hpcclear import load_scene, simulate
+from hpcclear import simulate
 
 TURN = 2 * math.pi
 STARTS = [math.radians(angle) for angle in (-70.0, 20.0, 115.0, 230.0, 400.0)]
@@ -120,20 +121,14 @@ def pin(journal, bearing, clearance=0.0):
 def scene_of(bodies, joints, drives, loads, ground, *, revolutions=1, **numerics):
     """A scene without gravity or friction; stiff contacts are damped, so that little rattles."""
     clearance = any(joint["kind"] == "clearance" for joint in joints.values())
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar", "bodies": bodies, "joints": joints, "drives": drives, "loads": loads,
-                "ground": {"points": ground},
-            },
-            "effects": {"contact": {"law": "hunt-crossley", "damping": 5.0}} if clearance else {},
-            "numerics": {
-                "rtol": 1e-6, "method": "tsitouras", "transient_revolutions": 0,
-                "averaged_revolutions": revolutions, **numerics,
-            },
-            "output": {"instants_per_revolution": 120},
-        }
+    return planar_scene(
+        bodies, joints, drives, ground=ground, loads=loads,
+        effects={"contact": {"law": "hunt-crossley", "damping": 5.0}} if clearance else {},
+        numerics={
+            "rtol": 1e-6, "method": "tsitouras", "transient_revolutions": 0,
+            "averaged_revolutions": revolutions, **numerics,
+        },
+        output={"instants_per_revolution": 120},
     )  # fmt: skip
 
 

@@ -5,8 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 
-from hpcclear import load_scene, simulate
+from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.scene.joints import PlanarRevolute
 from hpcclear.scene.loads.declared import JointEffect
@@ -20,25 +21,19 @@ def machine(loads, bodies=None, joints=None, drive=None, turns=3, **numerics):
     wheel = {"mass": 1.0, "inertia": 1e-2, "points": {"o": [0.0, 0.0]}}
     pendulum = {"mass": 0.5, "inertia": INERTIA, "points": {"o": [0.0, 0.0]}, "start_angle": START}
     clock = {"kind": "constant-speed", "body": "wheel", "speed": 2 * np.pi}
-    return load_scene(
+    return planar_scene(
+        {"wheel": wheel, **({"pendulum": pendulum} if bodies is None else bodies)},
         {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": {"wheel": wheel, **({"pendulum": pendulum} if bodies is None else bodies)},
-                "joints": {
-                    "wheel_pin": {**PIN, "journal": "wheel.o"},
-                    **({"pivot": {**PIN, "journal": "pendulum.o"}} if joints is None else joints),
-                },
-                "drives": {"clock": clock if drive is None else drive},
-                "loads": loads,
-            },
-            "effects": {"gravity": 0.0},
-            "numerics": {
-                "rtol": 1e-11, "transient_revolutions": 0, "averaged_revolutions": turns, **numerics,
-            },
-            "output": {"instants_per_revolution": 200},
-        }
+            "wheel_pin": {**PIN, "journal": "wheel.o"},
+            **({"pivot": {**PIN, "journal": "pendulum.o"}} if joints is None else joints),
+        },
+        {"clock": clock if drive is None else drive},
+        loads=loads,
+        effects={"gravity": 0.0},
+        numerics={
+            "rtol": 1e-11, "transient_revolutions": 0, "averaged_revolutions": turns, **numerics,
+        },
+        output={"instants_per_revolution": 200},
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import running
+from planar_scenes import planar_scene
 from scipy.integrate import solve_ivp
 from some_laws import row
 
@@ -17,7 +18,7 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.laws.friction import lugre
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
 
 LUGRE = {
@@ -72,28 +73,15 @@ def shaft(bodies: dict, joints: dict, hub: dict, speed: float, rtol: float, **fr
     materials = {"bearing": POLYMER, "journal": POLYMER}
     play = {"kind": "clearance", "clearance": CLEARANCE, "bearing_radius": RADIUS}
     own = {"shaft": {"mass": 1.0, "inertia": 1e-3, "points": {"o": [0.0, 0.0]}}}
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": own | bodies,
-                "joints": joints | {"hub": play | {"materials": materials} | hub},
-                "drives": {"motor": {"kind": "constant-speed", "body": "shaft", "speed": speed}},
-            },
-            "effects": {
-                "gravity": 9.81,
-                "contact": {"law": "hunt-crossley", "damping": CHI},
-                "friction": HUB | friction,
-            },
-            "numerics": {
-                "rtol": rtol,
-                "transient_revolutions": 0,
-                "averaged_revolutions": 1,
-                "energy": True,
-            },
-            "output": {"instants_per_revolution": 256},
-        }
+    numerics = {"rtol": rtol, "transient_revolutions": 0, "averaged_revolutions": 1}
+    contact = {"law": "hunt-crossley", "damping": CHI}
+    return planar_scene(
+        own | bodies,
+        joints | {"hub": play | {"materials": materials} | hub},
+        {"motor": {"kind": "constant-speed", "body": "shaft", "speed": speed}},
+        effects={"gravity": 9.81, "contact": contact, "friction": HUB | friction},
+        numerics={**numerics, "energy": True},
+        output={"instants_per_revolution": 256},
     )
 
 

@@ -5,9 +5,10 @@ An engine without clearance: its speed follows from the load, its piston's place
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 from scipy.interpolate import PchipInterpolator
 
-from hpcclear import load_scene, simulate
+from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import Compiled
@@ -25,33 +26,24 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 def engine(load, motor=None, **numerics):
     """Crank, rod and piston without clearance under one load, the crank at 200 degrees and 3000 rpm with a flywheel."""
-    return load_scene(
+    free = {
+        "kind": "torque", "body": "crank", "torque": 0.0, "initial_speed": "3000 rpm", "flywheel_inertia": INERTIA,
+    }  # fmt: skip
+    return planar_scene(
         {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": {
-                    "crank": {"length": CRANK, "mass": 0.9, "inertia": 6e-4, "mass_center": 0.0, "start_angle": "200 deg"},
-                    "rod": {"length": ROD, "mass": 0.55, "inertia": 1.9e-3, "mass_center": "48 mm"},
-                    "slider": {"mass": 0.35, "points": {"pin": [0, 0]}},
-                },
-                "joints": {
-                    "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
-                    "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "rod.a"},
-                    "o3": {"kind": "revolute", "journal": "slider.pin", "bearing": "rod.b"},
-                    "way": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
-                },
-                "drives": {
-                    "motor": motor
-                    or {
-                        "kind": "torque", "body": "crank", "torque": 0.0, "initial_speed": "3000 rpm",
-                        "flywheel_inertia": INERTIA,
-                    }
-                },
-                "loads": {"gas": load},
-            },
-            "numerics": {"transient_revolutions": 0, "averaged_revolutions": 1, **numerics},
-        }
+            "crank": {"length": CRANK, "mass": 0.9, "inertia": 6e-4, "mass_center": 0.0, "start_angle": "200 deg"},
+            "rod": {"length": ROD, "mass": 0.55, "inertia": 1.9e-3, "mass_center": "48 mm"},
+            "slider": {"mass": 0.35, "points": {"pin": [0, 0]}},
+        },
+        {
+            "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+            "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "rod.a"},
+            "o3": {"kind": "revolute", "journal": "slider.pin", "bearing": "rod.b"},
+            "way": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
+        },
+        {"motor": motor or free},
+        loads={"gas": load},
+        numerics={"transient_revolutions": 0, "averaged_revolutions": 1, **numerics},
     )  # fmt: skip
 
 
@@ -139,24 +131,16 @@ def test_a_pulse_over_the_time_gives_a_wheel_its_momentum(interpolation):
 
 def wheel(load, interpolation="smooth", revolutions=2, motor=None):
     """A wheel that turns freely, fast enough to get over the pulse."""
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar",
-                "bodies": {"wheel": {"mass": 1.0, "inertia": 1e-2, "points": {"o": [0.0, 0.0]}}},
-                "joints": {"pin": {"kind": "revolute", "journal": "wheel.o", "bearing": "ground.o"}},
-                "drives": {
-                    "motor": motor
-                    or {"kind": "torque", "body": "wheel", "torque": 0.0, "initial_speed": 320.0}
-                },
-                "loads": {"jam": load},
-            },
-            "numerics": {
-                "transient_revolutions": 0, "averaged_revolutions": revolutions, "interpolation": interpolation,
-            },
-            "output": {"instants_per_revolution": 36},
-        }
+    free = {"kind": "torque", "body": "wheel", "torque": 0.0, "initial_speed": 320.0}
+    return planar_scene(
+        {"wheel": {"mass": 1.0, "inertia": 1e-2, "points": {"o": [0.0, 0.0]}}},
+        {"pin": {"kind": "revolute", "journal": "wheel.o", "bearing": "ground.o"}},
+        {"motor": motor or free},
+        loads={"jam": load},
+        numerics={
+            "transient_revolutions": 0, "averaged_revolutions": revolutions, "interpolation": interpolation,
+        },
+        output={"instants_per_revolution": 36},
     )  # fmt: skip
 
 

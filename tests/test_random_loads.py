@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from dense_linkage import Dense, comes_as, start_of
+from planar_scenes import planar_scene
 from scipy.interpolate import PchipInterpolator
 
-from hpcclear import load_scene, simulate
+from hpcclear import simulate
 from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start
 
 GRAVITY = 9.81
@@ -112,19 +113,14 @@ def random_scene(seed):
     for k, sort in enumerate(rng.choice(SORTS, 4, replace=False)):
         loads[f"load{k}"], curve = load_of(str(sort), rng)
         curves |= {} if curve is None else {f"load{k}": curve}
-    scene = load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar", "bodies": bodies, "joints": joints, "drives": {"motor": drive}, "loads": loads,
-                "ground": {"points": {"o": [0.0, 0.0], "p": [0.125, u(-0.01, 0.01)]}},
-            },
-            "effects": {"gravity": GRAVITY},
-            "numerics": {
-                "rtol": 1e-12, "method": "dormand-prince", "transient_revolutions": 0, "averaged_revolutions": 1,
-            },
-            "output": {"instants_per_revolution": 100},
-        }
+    scene = planar_scene(
+        bodies, joints, {"motor": drive}, loads=loads,
+        ground={"o": [0.0, 0.0], "p": [0.125, u(-0.01, 0.01)]},
+        effects={"gravity": GRAVITY},
+        numerics={
+            "rtol": 1e-12, "method": "dormand-prince", "transient_revolutions": 0, "averaged_revolutions": 1,
+        },
+        output={"instants_per_revolution": 100},
     )  # fmt: skip
     return scene, curves
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 from test_guides import GRAVITY, LAWS, dense_through_contact
 from test_loads import machine
 
@@ -121,16 +122,8 @@ def random_lever(seed):
             "torque": u(0, 5),
             "initial_speed": u(60.0, 120.0),
         }
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar", "bodies": bodies, "joints": joints, "drives": {"motor": drive},
-                "ground": {"points": {"o": [0.0, 0.0], "p": [u(-0.01, 0.01), -0.1]}},
-            },
-            **LAWS,
-        }
-    )  # fmt: skip
+    ground = {"o": [0.0, 0.0], "p": [u(-0.01, 0.01), -0.1]}
+    return planar_scene(bodies, joints, {"motor": drive}, ground=ground, **LAWS)
 
 
 @pytest.mark.parametrize(

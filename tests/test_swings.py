@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 from scipy.special import ellipj, ellipk
 
 from hpcclear import load_scene, simulate
@@ -17,17 +18,13 @@ def swing(start, length, inertia=0.0, drive=None):
     """A mass (1 kg) on a rod that hangs at `start` from straight below."""
     free = {"kind": "free", "body": "rod", "interval": 2.0}
     rod = {"length": length, "mass": 1.0, "mass_center": length, "inertia": inertia}
-    return load_scene({
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar",
-            "bodies": {"rod": {**rod, "start_angle": start - 0.5 * np.pi}},
-            "joints": {"pin": {"kind": "revolute", "journal": "rod.a", "bearing": "ground.o"}},
-            "drives": {"let_go": drive or free},
-        },
-        "effects": {"gravity": G},
-        "numerics": {**NUMERICS, "energy": True},
-    })  # fmt: skip
+    return planar_scene(
+        {"rod": {**rod, "start_angle": start - 0.5 * np.pi}},
+        {"pin": {"kind": "revolute", "journal": "rod.a", "bearing": "ground.o"}},
+        {"let_go": drive or free},
+        effects={"gravity": G},
+        numerics={**NUMERICS, "energy": True},
+    )
 
 
 def released(start, length, times):
@@ -74,22 +71,17 @@ def coupled(stiffness, inertia, speed, torque=None, **numerics):
     drive = {"kind": "constant-speed", "body": "motor", "speed": speed}
     free = {"kind": "torque", "body": "motor", "torque": 0.0, "initial_speed": abs(speed)}
     spring = {"kind": "torsion-spring", "body": "motor", "other": "rotor", "stiffness": stiffness}
-    return load_scene({
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar",
-            "bodies": bodies,
-            "ground": {"points": {"motor": [0.0, 0.0], "rotor": [0.2, 0.0]}},
-            "joints": {
-                name: {"kind": "revolute", "journal": f"{name}.o", "bearing": f"ground.{name}"}
-                for name in bodies
-            },
-            "drives": {"drive": drive if torque is None else free},
-            "loads": {"coupling": spring},
-        },
-        "effects": {"gravity": 0.0},
-        "numerics": {**NUMERICS, "averaged_revolutions": 8, **numerics},
-    })  # fmt: skip
+    pins = {
+        name: {"kind": "revolute", "journal": f"{name}.o", "bearing": f"ground.{name}"}
+        for name in bodies
+    }
+    return planar_scene(
+        bodies, pins, {"drive": drive if torque is None else free},
+        ground={"motor": [0.0, 0.0], "rotor": [0.2, 0.0]},
+        loads={"coupling": spring},
+        effects={"gravity": 0.0},
+        numerics={**NUMERICS, "averaged_revolutions": 8, **numerics},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["minimal", "baumgarte", "torque"])
@@ -153,23 +145,19 @@ def test_a_spring_that_the_follower_of_a_double_crank_winds_up_is_remarked():
             ("follower", 0.11, 1.2),
         )
     }
-    scene = load_scene({
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar",
-            "bodies": bars,
-            "ground": {"points": {"o": [0.0, 0.0], "p": [0.04, 0.0]}},
-            "joints": {
-                "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
-                "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
-                "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "follower.b"},
-                "o4": {"kind": "revolute", "journal": "follower.a", "bearing": "ground.p"},
-            },
-            "drives": {"motor": {"kind": "constant-speed", "body": "crank", "speed": 6.0}},
-            "loads": {"held": {"kind": "torsion-spring", "body": "follower", "stiffness": 0.1}},
+    scene = planar_scene(
+        bars,
+        {
+            "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+            "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+            "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "follower.b"},
+            "o4": {"kind": "revolute", "journal": "follower.a", "bearing": "ground.p"},
         },
-        "numerics": NUMERICS,
-    })  # fmt: skip
+        {"motor": {"kind": "constant-speed", "body": "crank", "speed": 6.0}},
+        ground={"o": [0.0, 0.0], "p": [0.04, 0.0]},
+        loads={"held": {"kind": "torsion-spring", "body": "follower", "stiffness": 0.1}},
+        numerics=NUMERICS,
+    )
     found = simulate(scene)
     assert "held is wound up by 2 turns" in found.attrs["cautions"]
     both = {"mechanism.loads.held.other": "crank"}
@@ -183,20 +171,15 @@ def many(count):
         for k in range(count)
     }
     crank = {"crank": {"length": 0.1, "mass": 1.0, "inertia": 0.1}}
-    return load_scene({
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar",
-            "bodies": {**crank, **rods},
-            "joints": {
-                f"pin_{name}": {"kind": "revolute", "journal": f"{name}.a", "bearing": "ground.o"}
-                for name in (*crank, *rods)
-            },
-            "drives": {"motor": {"kind": "constant-speed", "body": "crank", "speed": 6.0}},
-        },
-        "effects": {"gravity": G},
-        "numerics": {**NUMERICS, "averaged_revolutions": 1},
-    })  # fmt: skip
+    pins = {
+        f"pin_{name}": {"kind": "revolute", "journal": f"{name}.a", "bearing": "ground.o"}
+        for name in (*crank, *rods)
+    }
+    motor = {"kind": "constant-speed", "body": "crank", "speed": 6.0}
+    numerics = {**NUMERICS, "averaged_revolutions": 1}
+    return planar_scene(
+        {**crank, **rods}, pins, {"motor": motor}, effects={"gravity": G}, numerics=numerics
+    )
 
 
 def test_more_coordinates_than_there_is_room_for_are_one_message():

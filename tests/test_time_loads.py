@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from planar_scenes import planar_scene
 from scipy.integrate import solve_ivp
 from test_loads import INERTIA, PIN, START, angle_of, machine
 
@@ -230,19 +231,13 @@ def mirrored(side):
         "angle": [[t, a * side] for t, a in zip(times, angle, strict=True)],
     }
     loads = {"brake": {"kind": "torque", "body": "rocker", "torque": sorted(brake)}}
-    return load_scene(
-        {
-            "format_version": 2,
-            "mechanism": {
-                "kind": "planar", "bodies": bodies, "joints": joints, "drives": {"cam": drive}, "loads": loads,
-                "ground": {"points": {"o": [0.0, 0.0], "p": [0.13, 0.01 * side]}},
-            },
-            "effects": {
-                "gravity": 0.0, "contact": {"law": "hunt-crossley", "damping": 0.4},
-                "friction": {"law": "coulomb", "coefficient": 0.1, "ramp_speed": 0.05},
-            },
-            "numerics": {"rtol": 1e-9, "transient_revolutions": 0, "averaged_revolutions": 1},
-        }
+    return planar_scene(
+        bodies, joints, {"cam": drive}, loads=loads, ground={"o": [0.0, 0.0], "p": [0.13, 0.01 * side]},
+        effects={
+            "gravity": 0.0, "contact": {"law": "hunt-crossley", "damping": 0.4},
+            "friction": {"law": "coulomb", "coefficient": 0.1, "ramp_speed": 0.05},
+        },
+        numerics={"rtol": 1e-9, "transient_revolutions": 0, "averaged_revolutions": 1},
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from commands import overrides, run
 from linkages import bar, constant_speed, harmonic, pins, torque_drive
+from planar_scenes import planar_scene
 from test_linkage_scenes import ROCKER, rocker
 
 from hpcclear import load_scene, simulate
@@ -258,28 +259,22 @@ def test_a_journal_deep_in_its_bearing_is_no_result(depth, status):
 
 def ideal(bodies, joints, drives, ground, **numerics):
     """A scene of bars and pins alone: bodies (length, start in rad), joints (journal, bearing), drives (body, rad/s)."""
-    return load_scene(
+    return planar_scene(
         {
-            "mechanism": {
-                "kind": "planar",
-                "ground": {"points": ground},
-                "bodies": {
-                    name: {"length": size, "mass": 0.2, "inertia_ratio": 1.0, "start_angle": angle}
-                    for name, (size, angle) in bodies.items()
-                },
-                "joints": {
-                    f"j{k}": {"kind": "revolute", "journal": one, "bearing": two}
-                    for k, (one, two) in enumerate(joints)
-                },
-                "drives": {
-                    f"d{k}": {"kind": "constant-speed", "body": body, "speed": speed, "period": k == 0}
-                    for k, (body, speed) in enumerate(drives)
-                },
-            },
-            "numerics": {"transient_revolutions": 0, "averaged_revolutions": 2},
-            **numerics,
-        }
-    )  # fmt: skip
+            name: {"length": size, "mass": 0.2, "inertia_ratio": 1.0, "start_angle": angle}
+            for name, (size, angle) in bodies.items()
+        },
+        {
+            f"j{k}": {"kind": "revolute", "journal": one, "bearing": two}
+            for k, (one, two) in enumerate(joints)
+        },
+        {
+            f"d{k}": {"kind": "constant-speed", "body": body, "speed": speed, "period": k == 0}
+            for k, (body, speed) in enumerate(drives)
+        },
+        ground=ground,
+        **{"numerics": {"transient_revolutions": 0, "averaged_revolutions": 2}, **numerics},
+    )
 
 
 def parallelogram(start, speed, **more):
