@@ -89,17 +89,13 @@ class Recommended(NamedTuple):
         return found.sel(design=name) if found is not None and known else None
 
 
-def _no_steps(of: Recommended) -> Iterable[str]:
-    return ()
-
-
 class LinesOf(NamedTuple):
     """Lines of the answer of a study, and what it advises to do next."""
 
     place: int
     """Among all lines."""
     lines: Callable[[Recommended], Iterable[Line]]
-    steps: Callable[[Recommended], Iterable[str]] = _no_steps
+    steps: Callable[[Recommended], Iterable[str]] = lambda of: ()
 
 
 Part = TypeVar("Part", FigureOf, SectionOf, LinesOf)

@@ -73,7 +73,8 @@ def fit_all(run: StudyRun) -> Result:
             names=[coordinate(run.study.variable(name)) for name in names],
             snap=partial(snapped, run.study, names, model=True),
         )
-        result |= _packed(k, model) | _checked(run, k, model)
+        result |= {f"model{k}_{name}": array for name, array in arrays_of(model).items()}
+        result |= _checked(run, k, model)
     return result
 
 
@@ -138,10 +139,6 @@ def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
         )
         found.append(Piecewise((leaf,), unknown, unknown, accepted))
     return found
-
-
-def _packed(k: int, model: Piecewise) -> Result:
-    return {f"model{k}_{name}": array for name, array in arrays_of(model).items()}
 
 
 def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:

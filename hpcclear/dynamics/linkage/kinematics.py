@@ -265,14 +265,17 @@ class Kinematics:
         """Where a point is, along the ground's axes."""
         return sum((self.rotated(frame, arm) for frame, arm in point.arms.items()), NOWHERE)
 
+    def _moving(self, point: Point, frame: str) -> list[tuple[Move, Term]]:
+        """Moves of a point in a frame, and their speeds."""
+        moves = [move for move in point.moves if move.frame == frame and move.kind != "across"]
+        return [(one, named(self.speed_name((one.kind, one.body, "")))) for one in moves]
+
     def velocity(self, point: Point) -> Vector:
         """How fast it moves."""
         found = NOWHERE
         for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
-            for move in point.moves:
-                if move.frame == frame and move.kind != "across":
-                    speed = named(self.speed_name((move.kind, move.body, "")))
-                    found = found + self.rotated(frame, move.direction).times(speed)
+            for move, speed in self._moving(point, frame):
+                found = found + self.rotated(frame, move.direction).times(speed)
             arm = point.arms.get(frame, NOWHERE)
             found = found + self.rotated(frame, arm.times(self.spin(frame)).across())
         return found
@@ -283,14 +286,12 @@ class Kinematics:
         for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
             spin = self.spin(frame)
             turn = self.turn(frame) if self.given(frame) else second(Mover("angle", frame))
-            for move in point.moves:
-                if move.frame == frame and move.kind != "across":
-                    speed = named(self.speed_name((move.kind, move.body, "")))
-                    rate = second(Mover(move.kind, move.body))
-                    twice = spin * speed + spin * speed  # Coriolis
-                    moved = move.direction.times(rate) + move.direction.times(twice).across()
-                    moved = moved + move.changing.times(speed, speed)
-                    found = found + self.rotated(frame, moved)
+            for move, speed in self._moving(point, frame):
+                rate = second(Mover(move.kind, move.body))
+                twice = spin * speed + spin * speed  # Coriolis
+                moved = move.direction.times(rate) + move.direction.times(twice).across()
+                moved = moved + move.changing.times(speed, speed)
+                found = found + self.rotated(frame, moved)
             arm = point.arms.get(frame, NOWHERE)
             turned = arm.times(turn).across() - arm.times(spin, spin)
             found = found + self.rotated(frame, turned)

@@ -116,6 +116,10 @@ class Loops:
         """Other numbers of the same mechanism, by names as of `numbers.values`: single ones, or arrays of samples (m,)."""
         self._par = {row: base[name] for name, row in self._rows.items()}
 
+    def scaled(self, jacobian: Array) -> Array:
+        """Jacobians (..., rows, n) in units of coordinates and constraints."""
+        return jacobian * self.scales / self.row_scales[:, None]
+
     def at(self, q: Array, v: Array, time: Number) -> State:
         """Constraints of coordinates and velocities (n, ...) at times (...) in s."""
         rows, shape = len(self.owners), np.shape(time)

@@ -127,10 +127,9 @@ def cubic(q0: Array, v0: Array, q1: Array, v1: Array, s: Array) -> Array:
 def _inverse(loops: Loops, q: Array, time: Array | float) -> tuple[Array, State]:
     """Inverses (..., n, n) of the scaled Jacobians, and the constraints, velocities at 0."""
     state = loops.at(q, np.zeros_like(q), time)
-    scaled = state.jacobian * loops.scales / loops.row_scales[:, None]
     # never singular to the last bit, which numpy would refuse for all of them
-    inverse: Array = np.linalg.inv(scaled + 1e-15 * np.eye(loops.size))
-    return inverse, state
+    regular = loops.scaled(state.jacobian) + 1e-15 * np.eye(loops.size)
+    return np.asarray(np.linalg.inv(regular), float), state
 
 
 def _margins(inverse: Array) -> Array:
@@ -162,8 +161,8 @@ class _Walker:
             return None
         inverse, state = _inverse(loops, q, time)
         v = -loops.scales * (inverse @ (state.rate / loops.row_scales))
-        determinant = np.linalg.det(state.jacobian * loops.scales / loops.row_scales[:, None])
-        return WalkPose(time, q, v, float(determinant), float(_margins(inverse)))
+        determinant = float(np.linalg.det(loops.scaled(state.jacobian)))
+        return WalkPose(time, q, v, determinant, float(_margins(inverse)))
 
     def step(self, here: WalkPose, turn: Array, h: float) -> tuple[WalkPose, float] | None:
         """A step of so many s, and how much of what it may be off it is; None if it is further off. `turn`: v's rate."""
@@ -206,10 +205,9 @@ class _Walker:
         return cubic(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
 
     def _determinant(self, a: WalkPose, b: WalkPose, h: float, s: float) -> float:
-        loops = self.loops
         q = self._along(a, b, s)
-        jacobian = loops.at(q, np.zeros_like(q), a.time + s * h).jacobian
-        return float(np.linalg.det(jacobian * loops.scales / loops.row_scales[:, None]))
+        jacobian = self.loops.at(q, np.zeros_like(q), a.time + s * h).jacobian
+        return float(np.linalg.det(self.loops.scaled(jacobian)))
 
     def leap(
         self, here: WalkPose, turn: Array, h: float

@@ -140,8 +140,7 @@ def why(assembly: Assembly, passage: Passage) -> str:
     status, node = passage.ended
     loops, mechanism = assembly.loops, assembly.loops.mechanism
     pose = pose_at(assembly, passage, node)
-    jacobian = loops.at(pose.q, pose.v, node.time).jacobian * loops.scales
-    jacobian = jacobian / loops.row_scales[:, None]
+    jacobian = loops.scaled(loops.at(pose.q, pose.v, node.time).jacobian)
     left = np.linalg.svd(jacobian)[0][:, -1]  # the forces that hold one another
     held = {
         joint.name: float(np.linalg.norm(left[np.array(loops.owners) == f"joints.{joint.name}"]))
