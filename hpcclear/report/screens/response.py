@@ -105,6 +105,7 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
             "bearings",
         )
     f, reach = float(response["objective"]), half_width(response)
+    percent = 100 * reach / abs(f) if f else 0.0  # without clearance it may be 0, exactly
     if not np.isfinite(reach):
         yield Trust(
             Level.AMBER, "The interval of f is not known: set numerics.target_error", "bearings"
@@ -112,11 +113,11 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
     elif reach > bearings.SENSITIVE * abs(f):
         yield Trust(
             Level.AMBER,
-            f"f is sensitive to initial conditions or tolerance: ± {100 * reach / abs(f):.0f} %",
+            f"f is sensitive to initial conditions or tolerance: ± {percent:.0f} %",
             "bearings",
         )
     else:
-        yield Trust(Level.GREEN, f"f is known to ± {100 * reach / abs(f):.2g} %", "bearings")
+        yield Trust(Level.GREEN, f"f is known to ± {percent:.2g} %", "bearings")
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
         yield Trust(
             Level.GREEN if regime is Regime.REGULAR else Level.AMBER,
