@@ -74,11 +74,19 @@ def half_width(response: Results) -> float:
     return float(response["objective_limit" if "regime" in response else "objective_uncertainty"])
 
 
+def _within(response: Results) -> str:
+    """The half-width of f, over f where that is not 0, in words."""
+    f, reach = float(response["objective"]), half_width(response)
+    if not np.isfinite(reach):
+        return labels.NOT_CHECKED
+    unit = str(response["objective"].attrs["units"])
+    return f"± {100 * reach / abs(f):.2g} %" if f else f"± {labels.quantity(reach, unit)}"
+
+
 def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tile]:
     f, unit = float(response["objective"]), str(response["objective"].attrs["units"])
-    reach = half_width(response) / abs(f) if f else np.nan
-    within = f"± {100 * reach:.2g} %" if np.isfinite(reach) else labels.NOT_CHECKED
-    yield Tile("f", labels.quantity(f, unit, 2 if reach > 0.05 else 4), within=within)
+    digits = 2 if half_width(response) > 0.05 * abs(f) else 4
+    yield Tile("f", labels.quantity(f, unit, digits), within=_within(response))
     for one in sorted(loads, key=lambda one: -one.peak)[:1]:
         angle = "" if bearings.degrees(one) == "–" else f"at {bearings.degrees(one)}"
         yield Tile(f"peak force, {one.joint}", labels.quantity(one.peak, "N"), within=angle)
@@ -105,7 +113,6 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
             "bearings",
         )
     f, reach = float(response["objective"]), half_width(response)
-    percent = 100 * reach / abs(f) if f else 0.0  # without clearance it may be 0, exactly
     if not np.isfinite(reach):
         yield Trust(
             Level.AMBER, "The interval of f is not known: set numerics.target_error", "bearings"
@@ -113,11 +120,11 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
     elif reach > bearings.SENSITIVE * abs(f):
         yield Trust(
             Level.AMBER,
-            f"f is sensitive to initial conditions or tolerance: ± {percent:.0f} %",
+            f"f is sensitive to initial conditions or tolerance: {_within(response)}",
             "bearings",
         )
     else:
-        yield Trust(Level.GREEN, f"f is known to ± {percent:.2g} %", "bearings")
+        yield Trust(Level.GREEN, f"f is known to {_within(response)}", "bearings")
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
         yield Trust(
             Level.GREEN if regime is Regime.REGULAR else Level.AMBER,
