@@ -115,6 +115,21 @@ def test_what_the_first_designs_missed_is_found():
     assert missed == 0
 
 
+@pytest.mark.parametrize("level", [0.0, 1.0, 2868.776])
+def test_a_trend_that_is_flat_but_for_round_off_is_none(level):
+    """A surrogate of rough values is a constant: a slope of its last bits left no digit of the values."""
+    rng = np.random.default_rng(7)
+    designs = BOUNDS[:, 0] + rng.random((30, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = 3000.0 + 1000.0 * designs[:, :1]
+
+    def flat(points):
+        return level * (1.0 + 2e-16 * np.round(np.sin(1e3 * points[:, 1])))
+
+    space = Space(BOUNDS, np.eye(1), (None,), np.empty(0), trends=(flat,))
+    beliefs = Beliefs(known_of(designs, values, 10.0), space, rng)
+    np.testing.assert_allclose(beliefs.believed, values, atol=60.0)
+
+
 def test_more_simulations_are_worth_most_where_they_may_change_the_choice():
     """Of three designs with large errors two compete; what is known exactly, or is out of question, is worth nothing."""
     rng = np.random.default_rng(4)

@@ -20,6 +20,9 @@ NOISE = 1e-3, 2.0
 """Between these factors on the variance of known errors is the noise variance of a model. Designs that meet the same scatter
 share most of their errors, which then are no noise between them."""
 
+FLAT = 1e-9
+"""Changes of a trend over its size that are no more than round-off: a slope of them would have no digit of the values left."""
+
 LENGTHS = (0.1, 3.0)
 """Length scales in the unit cube: a statistic that changes faster is not found by some ten designs per variable."""
 
@@ -192,7 +195,8 @@ def _trended(
     guess, known = trend(designs), np.isfinite(values)
     steps = guess[known] - guess[known].mean() if known.any() else guess[known]
     squares = float(steps @ steps)
-    slopes = [0.0, float(steps @ values[known]) / squares] if squares > 0.0 else [0.0]
+    moves = squares > FLAT**2 * float(np.square(guess[known]).sum())
+    slopes = [0.0, float(steps @ values[known]) / squares] if moves else [0.0]
     made = [
         Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
         for slope in slopes
