@@ -115,6 +115,29 @@ def test_what_the_first_designs_missed_is_found():
     assert missed == 0
 
 
+SHAPES = {
+    "parabola": lambda x: 1e3 * bowl(x), "constant": lambda x: 0.0 * x[:, 0] + 7.0,
+    "offset": lambda x: 1e6 + x[:, 0], "steep": lambda x: np.exp(8.0 * x[:, 0]),
+    "step": lambda x: np.where(x[:, 0] > 0.5, 1e5, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("error", "count"), [(0.0, 150), (1e-6, 150), (1.0, 150), (0.0, 12)])
+def test_draws_are_had_of_any_values(shape, error, count):
+    """Known exactly and in number, designs have variances of round-off; draws of them have their size and no other."""
+    rng = np.random.default_rng(3)
+    designs = BOUNDS[:, 0] + rng.random((count, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = SHAPES[shape](designs)[:, None]
+    space = Space(BOUNDS, np.eye(1), (None,), np.empty(0))
+    beliefs = Beliefs(known_of(designs, values, error), space, rng)
+    for _ in range(3):
+        point, loss = improvement.drawn(beliefs, np.ones(1))
+        largest = beliefs.variances(np.vstack([designs, point])).max() ** 0.5
+        assert 0.0 <= loss < 10.0 * (largest + beliefs.models[0].rest.scale)
+        beliefs.take(point)
+
+
 @pytest.mark.parametrize("level", [0.0, 1.0, 2868.776])
 def test_a_trend_that_is_flat_but_for_round_off_is_none(level):
     """A surrogate of rough values is a constant: a slope of its last bits left no digit of the values."""

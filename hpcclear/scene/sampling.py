@@ -135,7 +135,7 @@ def monte_carlo(
     moving = [name for name in names if name in chosen or fixed is None]
     replicates = [replicate] if isinstance(replicate, int) else replicate
     uniform = _chances(study.seed, purpose, moving, (first, count), replicates, stratified)
-    count *= len(replicates or [0])
+    each, count = count, count * len(replicates or [0])
     if study.correlation is not None:
         uniform = _together(study.correlation, moving, chosen, uniform)
     places = dict(zip(moving, uniform, strict=True))
@@ -156,7 +156,7 @@ def monte_carlo(
             if name not in chosen and study.variable(name).ratio is not None:
                 values[:, column] *= slender_inertias(scene, paths, values, paths[column][0])
     points = Points(names, values, paths)
-    check_points(scene, points, lambda row: f"sample {first + row}")
+    check_points(scene, points, lambda row: f"sample {first + row % each}")
     return points
 
 

@@ -30,7 +30,7 @@ KIND = ResultKind(
             "measured feature, in SI units of its signal; NaN where a record lacks it"),
         "predicted": number(("record", "feature"), "1", "predictive mean of the feature"),
         "predicted_deviation": number(("record", "feature"), "1", "predictive standard deviation of the feature"),
-        "elapsed": number(("record",), "s", "time since the first record"),
+        "elapsed": number(("record",), "s", "time since the first record, NaN without dates"),
         "widening": number(("record", "unknown"), "1",
             "factor by which the intervals of the record were widened, from machines simulated with its noise"),
         "coverage": number(("record", "unknown"), "1",

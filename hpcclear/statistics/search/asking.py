@@ -72,7 +72,7 @@ class Search(Protocol):
 
 
 def made(maker: Callable[[SearchTask], Any], name: str, task: SearchTask) -> Search:
-    """The search of a name. Raises InputError if it cannot be made of a task, or has no `ask` or no `tell`."""
+    """Return the search with this name. Raises InputError if it does not take the task, or lacks `ask` or `tell`."""
     try:
         search = maker(task)
     except InputError:

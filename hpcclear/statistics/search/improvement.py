@@ -27,6 +27,7 @@ from collections.abc import Callable
 
 import moocore
 import numpy as np
+from scipy.linalg.lapack import dpstrf
 from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
@@ -47,7 +48,7 @@ DRAWS = 64
 together."""
 
 ROUND_OFF = 1e-9
-"""Added to variances, over the sum of all: so far a covariance may be from a positive one."""
+"""Smallest variance that is drawn, over the largest."""
 
 Merit = Callable[[Array], Array]
 
@@ -89,10 +90,14 @@ def drawn(beliefs: Beliefs, direction: Array) -> tuple[Array, float]:
     for model, weight in zip(beliefs.models, direction, strict=True):
         if model is not None and weight:
             square += weight**2 * model.rest.covariance(points)
-    square[np.diag_indices_from(square)] += ROUND_OFF * (square.trace() + 1e-300)
     mean = beliefs.means(points) @ direction
     draws = beliefs.rng.standard_normal((DRAWS, len(points)))
-    paths = mean + draws @ np.linalg.cholesky(square).T
+    # Known designs have next to no variance, and round-off makes some of it negative: pivots end before these.
+    factor, order, rank, _ = dpstrf(
+        square, tol=ROUND_OFF * max(square.diagonal().max(), 0.0), lower=1
+    )
+    paths = np.tile(mean, (DRAWS, 1))
+    paths[:, order - 1] += draws[:, :rank] @ np.tril(factor)[:, :rank].T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)
     return points[np.where(new, paths[0], np.inf).argmin()], float(loss.mean())
 
