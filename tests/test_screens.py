@@ -1,5 +1,6 @@
 """Pages of every kind of result in a browser: first screen, accessibility by axe-core (WCAG A and AA), nothing sideways."""
 
+import re
 from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
@@ -99,6 +100,10 @@ def browser() -> Iterator[Browser]:
     made = Browser()
     yield made
     made.close()
+
+
+def test_the_headline_of_lives_names_their_limit(pages: dict[str, Path]) -> None:
+    assert re.search(r"<h1>.* reach a clearance of 0\.5.mm ", pages["life"].read_text("utf-8"))
 
 
 def unfold(browser: Browser) -> None:
