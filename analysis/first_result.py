@@ -101,7 +101,10 @@ def compare(before: Path, pairs: int) -> None:
                 for root in (before, ROOT):
                     cache = tempfile.mkdtemp(dir=folder) if cold else warm[root]
                     warm.setdefault(root, cache)
-                    pair.append(run(overrides, cache, Path(folder) / "out.nc", root))
+                    out = (
+                        Path(tempfile.mkdtemp(dir=folder)) / "out.nc"
+                    )  # versions do not read each other's
+                    pair.append(run(overrides, cache, out, root))
                 found.append(pair)
             times = [
                 round(statistics.median(pair[side][kind] for pair in found), 2)
