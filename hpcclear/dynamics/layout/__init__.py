@@ -93,16 +93,9 @@ SPEED = OF_SAMPLE("of the drive: a turn over its share of the period", "rad/s")
 DRIVEN_LENGTH = OF_SAMPLE("largest distance between points of the body that gives the period", "m")
 PERIOD = OF_SAMPLE("one revolution at the prescribed speed", "s")
 FIRST_STEP = OF_SAMPLE("first step to try", "s")
-STRICTNESS = OF_SAMPLE(
-    "squared: how many times tighter this sample's tolerances are than the run's"
-)
-EDGE = OF_SAMPLE(
-    "one over the relative tolerance that explicit steps need at the edge of stability"
-)
-TURN_END = OF_SAMPLE(
-    "angle of the free body that gives the period at which its revolution ends: its start and all its turns",
-    "rad",
-)
+STRICTNESS = OF_SAMPLE("squared: how many times tighter than the run's its tolerances are")
+EDGE = OF_SAMPLE("one over the relative tolerance of explicit steps at the edge of stability")
+TURN_END = OF_SAMPLE("angle at which a revolution of a free body ends", "rad")
 HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest drive torque", "N m")
 HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
@@ -111,12 +104,9 @@ OF_JOINT = RowNumbers()  # within a joint's block
 CLEARANCE = OF_JOINT("radial clearance", "m")
 BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")
 JOURNAL_RADIUS = OF_JOINT("radius of the journal", "m")
-EXPONENT = OF_JOINT(
-    "of the depth in the normal force; this and the next are what peaks between steps are found by"
-)
-DAMPING = OF_JOINT(
-    "factor of the rate in the normal force, or of the rate over the impact speed", "s/m"
-)
+# peaks between steps are found by these two
+EXPONENT = OF_JOINT("of the depth in the normal force")
+DAMPING = OF_JOINT("factor of the rate in it, or of the rate over the impact speed", "s/m")
 DEEPEST_VALID = OF_JOINT("depth from where on a result is flagged", "m")
 INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction changes most", "s/m")
 STEEPNESS = OF_JOINT("largest slope of friction over normal force", "s/m")
@@ -125,25 +115,17 @@ FRICTION_NUMBERS = OF_JOINT("of its law of friction", size=LAW_NUMBERS)
 FILM_SCALE = OF_JOINT("of the film's force; 0 where there is none", "N s/m")
 FILM_SHEAR = OF_JOINT("2 pi mu L R^3/c", "N m s")
 FILM_FLOOR = OF_JOINT("least thickness over the clearance")
-FILM_STEEPNESS = OF_JOINT(
-    "the film's force over that of inertia, by the speed; with bristles next to nothing, but not nothing",
-    "s/m",
-)
+# with bristles next to nothing, but not nothing
+FILM_STEEPNESS = OF_JOINT("the film's force over that of inertia, by the speed", "s/m")
 JOINT_ROWS = OF_JOINT.end
 JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
 OWN = OF_SAMPLE("what a linkage has of its own", size=192 + 16 * 64)
-WAVES = OF_SAMPLE(
-    "of surfaces that are out of round, in scenes that have such: those of `wave_rows`, and for each another, its slope's",
-    size=2 * WAVE_ROWS,
-)
-THRESHOLDS = OF_SAMPLE(
-    "of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1",
-    size=2 * MAX_JOINTS,
-)
+# in scenes that have such: those of `wave_rows`, and for each another, its slope's
+WAVES = OF_SAMPLE("of surfaces that are out of round", size=2 * WAVE_ROWS)
+# two a joint: (slope) F_N + (offset), between 0 and 1
+THRESHOLDS = OF_SAMPLE("of what share of the normal force wears", size=2 * MAX_JOINTS)
 FURTHER_ROWS = 180
-FURTHER = OF_SAMPLE(
-    "what laws of films have besides, joint by joint", size=MAX_JOINTS * FURTHER_ROWS
-)
+FURTHER = OF_SAMPLE("what laws of films have besides", size=MAX_JOINTS * FURTHER_ROWS)
 PARAMETERS = OF_SAMPLE.end
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
@@ -160,9 +142,7 @@ DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="energies")
 LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="energies")
 FRICTIONS = WRITTEN("tangential force, for time series and objectives", "N", EACH)
 DRIVE_MOMENT = WRITTEN("for time series, responses and objectives", "N m")
-FOLLOWED_ACCELERATION = WRITTEN(
-    "of a guided body, or of a point along x", "m/s^2", asked_by="responses"
-)
+FOLLOWED_ACCELERATION = WRITTEN("of a body, or a point along x", "m/s^2", asked_by="responses")
 FOLLOWED_SQUARE = WRITTEN("of the followed acceleration", "m^2/s^4", asked_by="responses")
 FOLLOWED_ACROSS = WRITTEN("of a point along y", "m/s^2", asked_by="responses")
 IMPACT_POWERS = WRITTEN("lost by the damping of contacts, friction left out", "W", EACH, "impacts")
@@ -170,37 +150,21 @@ FORCE_SQUARES = WRITTEN("of the normal force", "N^2", EACH, "impacts")
 FRAME_X = WRITTEN("force of the mechanism on its frame, along x", "N", asked_by="impacts")
 FRAME_Y = WRITTEN("likewise along y", "N", asked_by="impacts")
 FRAME_SQUARE = WRITTEN("square of its size", "N^2", asked_by="impacts")
-FLIGHTS = WRITTEN(
-    "no rate, its integral is summed up at the ends of steps: time without contact",
-    "s",
-    EACH,
-    "steps",
-)
-BEGUN = WRITTEN("likewise: how many contacts began", "", EACH, "steps")
+# no rates, their integrals are summed up at the ends of steps
+FLIGHTS = WRITTEN("time without contact", "s", EACH, "steps")
+BEGUN = WRITTEN("how many contacts began", "", EACH, "steps")
 SLIDING_POWERS = WRITTEN("F_N |v_t|", "W", EACH, "wear")
-OBJECTIVE_RATES = WRITTEN(
-    "of the objective: of each joint, or the first of the whole mechanism", "", EACH, "objective"
-)
+OBJECTIVE_RATES = WRITTEN("of each joint, or the first of the whole", "", EACH, "objective")
 SLIDING_SPEEDS = WRITTEN("this and normals for the objective's rate only", "m/s", EACH)
 NORMALS_X = WRITTEN("from the bearing's centre to the journal's", "", EACH)
 NORMALS_Y = WRITTEN("likewise", "", EACH)
-FORCE_KINKS = WRITTEN(
-    "changes its sign where the normal force is cut at 0; these for the implicit method only",
-    "",
-    EACH,
-)
+# for the implicit method only
+FORCE_KINKS = WRITTEN("changes its sign where the normal force is cut at 0", "", EACH)
 LOW_KINKS = WRITTEN("changes its sign at the lower side of friction's ramp", "", EACH)
 HIGH_KINKS = WRITTEN("and at the upper side", "", EACH)
-ANGLES = WRITTEN(
-    "cosine and sine of the contact's angle in the bearing, then in the journal", "", 4 * EACH
-)
-"""These and what follows are for profiles of wear only, and stand last, so that others need not pass over them."""
-PROFILES = WRITTEN(
-    "sliding powers times waves of these angles, in the order of `wave_rows`",
-    "W",
-    WAVE_ROWS,
-    "profile",
-)
+# these and what follows are for profiles of wear only, and stand last, so that others need not pass over them
+ANGLES = WRITTEN("cosine and sine of the contact's angle in bearing and journal", "", 4 * EACH)
+PROFILES = WRITTEN("sliding powers times waves, as of `wave_rows`", "W", WAVE_ROWS, "profile")
 MAX_CURVES = 8
 PLACES = WRITTEN("of tabulated curves: shares of their lengths", "", MAX_CURVES)
 PLACE_RATES = WRITTEN("their rates", "1/s", MAX_CURVES)
@@ -276,11 +240,8 @@ QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
 VS = OF_LANE("velocities", size=MAX_COORDINATES)
 ACC = OF_LANE("accelerations of the stage", size=MAX_COORDINATES)
 MAX_PINS = 96
-PINS = OF_LANE(
-    "forces of ideal pins on their journals, along x, then along y; of observed motions only",
-    "N",
-    2 * MAX_PINS,
-)
+# of observed motions only
+PINS = OF_LANE("forces of ideal pins on their journals, along x, then along y", "N", 2 * MAX_PINS)
 RATE_NOW = OF_LANE("rates of the stage", size=RATES)
 RATE_OLD = OF_LANE("rates at the start of the step", size=RATES)
 RATE_SUM = OF_LANE("weighted by the method: h * sum is the integral over the step", size=RATES)
@@ -311,16 +272,12 @@ REJECTION_SCORE = OF_LANE("of rejected explicit steps")
 STIFF_STEPS_HERE = OF_LANE("implicit steps tried since it took the lane over")
 STIFF_STEPS = OF_LANE("implicit steps tried for this sample")
 CALM = OF_LANE("implicit steps in a row that the explicit method could have taken")
-STRICTER = OF_LANE(
-    "squared: how many times tighter than the run's the tolerances of this lane's explicit steps are"
-)
+STRICTER = OF_LANE("squared: how many times tighter than the run's explicit tolerances are")
 STRICTER_WITHIN = OF_LANE("that within the range of stability")
 STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
 CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
-NEXT_ROW = OF_LANE(
-    "above a curve's place: where a step ends, a share of its length", size=MAX_CURVES
-)
-LAST_ROW = OF_LANE("and below it; both 0 where they are not known", size=MAX_CURVES)
+NEXT_ROW = OF_LANE("of a table above its place, where a step ends; 0: not known", size=MAX_CURVES)
+LAST_ROW = OF_LANE("and below it", size=MAX_CURVES)
 RESUMED = OF_LANE("step proposed before it was shortened to end at such a row, or 0", "s")
 ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
 INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
@@ -328,9 +285,7 @@ PEAK = OF_LANE("largest contact force", "N", EACH)
 DEEPEST = OF_LANE("largest penetration", "m", EACH)
 ENDED = OF_LANE("contacts ended in this revolution", "", EACH)
 LARGEST_RATE = OF_LANE("of the objective's", "", EACH)
-TOUCHES = OF_LANE(
-    "whether there was contact at the end of the last step; below 0 at the start", "", EACH
-)
+TOUCHES = OF_LANE("whether the last step ended in contact; below 0 at the start", "", EACH)
 WORK = OF_LANE.end
 
 BANK = WORK + PARAMETERS
@@ -349,10 +304,8 @@ M2_F = OF_BOOK("sum of squares about it")
 COUNT_F = OF_BOOK("how many")
 ELAPSED = OF_BOOK("whole revolutions so far", "s")
 LATCHED = OF_BOOK("whole revolutions in contact", "", EACH)
-AVERAGED = OF_BOOK(
-    "integrals over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
-)
-TOTAL = OF_BOOK("integrals over all revolutions, likewise", size=len(INTEGRATED))
+AVERAGED = OF_BOOK("integrals of INTEGRATED over the averaged revolutions", size=len(INTEGRATED))
+TOTAL = OF_BOOK("and over all revolutions", size=len(INTEGRATED))
 BOOK = OF_BOOK.end
 
 

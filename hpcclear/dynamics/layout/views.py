@@ -78,9 +78,7 @@ class Start(View):
     """Starts of samples: coordinates and velocities (of those the topology has), contact states."""
 
     _rows = Declared()
-    moving = _rows.column(
-        "all places of coordinates, then of velocities", size=2 * at.MAX_COORDINATES
-    )
+    moving = _rows.column("coordinates, then velocities, all places", "", 2 * at.MAX_COORDINATES)
     contacts = Column(_rows.end, 2 * EACH)
     active = _rows.column("contact whose impact speed is kept (1), or flight (0)", "", EACH)
     inverse_impact = _rows.column("1 / d'_0 there", "s/m", EACH)
@@ -131,9 +129,7 @@ class Outcome(View):
     attempts = _rows.column("steps tried")
     stiff_steps = _rows.column("implicit steps tried")
     peak_moment = _rows.column("largest size of the drive's moment", "N m")
-    acceleration_deviation = _rows.column(
-        "standard deviation of the followed acceleration", "m/s^2"
-    )
+    acceleration_deviation = _rows.column("standard deviation of what is followed", "m/s^2")
     peak_acceleration = _rows.column("its largest size", "m/s^2")
     period = _rows.column("mean length of an averaged revolution", "s")
     cycle = _rows.column("angle of the drive in a revolution", "rad")
@@ -144,15 +140,10 @@ class Outcome(View):
     active = _rows.column("contact whose impact speed is kept, at the end", "", EACH)
     inverse_impact = _rows.column("1 / d'_0 there", "s/m", EACH)
     largest_rate = _rows.column("of the objective's", "", EACH)
-    mean = _rows.column(
-        "time means over the averaged revolutions, in the order of INTEGRATED",
-        "",
-        len(at.INTEGRATED),
-    )
-    total = _rows.column("integrals over all revolutions, likewise", "", len(at.INTEGRATED))
-    moving = _rows.column(
-        "coordinates and velocities at the end, all places", "", 2 * at.MAX_COORDINATES
-    )
+    # in the order of INTEGRATED
+    mean = _rows.column("time means over the averaged revolutions", "", len(at.INTEGRATED))
+    total = _rows.column("integrals over all revolutions", "", len(at.INTEGRATED))
+    moving = _rows.column("at the end, as of a start", "", 2 * at.MAX_COORDINATES)
     size = _rows.end
 
     mean_gap = Column(mean.first, EACH)  # m
@@ -214,9 +205,7 @@ class RunSettings(View):
     exponent = _rows.column("of the step-size control")
     beta = _rows.column("likewise, of the error before")
     implicit = _rows.column("0 never, 1 where the motion is stiff, 2 always")
-    cycle = _rows.column(
-        "by which the driven body turns in a revolution; negative clockwise", "rad"
-    )
+    cycle = _rows.column("turn of the driven body in a revolution; negative clockwise", "rad")
     parameter_rows = _rows.column("how many parameters a sample has")
     profiled = _rows.column("how many rates of profiles of wear there are to integrate")
     at_rest = _rows.column("within which a crank that starts from rest may turn back", "rad")
@@ -224,9 +213,7 @@ class RunSettings(View):
     chosen = _rows.column("of each joint: 1 where its gap counts for the objective", "", EACH)
     atol_coordinates = _rows.column("absolute tolerances", "", at.MAX_COORDINATES)
     atol_velocities = _rows.column("and of velocities", "", at.MAX_COORDINATES)
-    wraps = _rows.column(
-        "by which each coordinate is counted anew with a revolution", "rad", at.MAX_COORDINATES
-    )
+    wraps = _rows.column("of coordinates with each revolution", "rad", at.MAX_COORDINATES)
     size = _rows.end
 
 
