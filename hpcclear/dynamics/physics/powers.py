@@ -6,6 +6,9 @@ from hpcclear.base.bits import bits_of, double_of, no_less
 from hpcclear.base.exponentials import falling
 from hpcclear.base.jit import lane_function
 
+_OF_ARTANH = tuple(1.0 / k for k in range(21, 0, -2))
+_OF_ARCTAN = tuple((k % 4 - 2.0) / k for k in range(23, 1, -2))
+
 
 @lane_function
 def exponential(x):
@@ -28,18 +31,9 @@ def logarithm(x):
     exponent = exponent + 1.0 if large else exponent
     s = (m - 1.0) / (m + 1.0)
     q = s * s
-    p = 0.043478260869565216  # 1/23
-    p = p * q + 0.047619047619047616
-    p = p * q + 0.05263157894736842
-    p = p * q + 0.058823529411764705
-    p = p * q + 0.06666666666666667
-    p = p * q + 0.07692307692307693
-    p = p * q + 0.09090909090909091
-    p = p * q + 0.1111111111111111
-    p = p * q + 0.14285714285714285
-    p = p * q + 0.2
-    p = p * q + 0.3333333333333333
-    p = p * q + 1.0
+    p = 1.0 / 23.0
+    for factor in _OF_ARTANH:
+        p = p * q + factor
     found = exponent * 1.9082149292705877e-10 + 2.0 * s * p + exponent * 0.6931471803691238
     return found if x == x else x
 
@@ -67,18 +61,9 @@ def arctan(x):
     t = a / (1.0 + math.sqrt(1.0 + a * a))
     t = t / (1.0 + math.sqrt(1.0 + t * t))
     q = t * t
-    p = -0.04
-    p = p * q + 0.043478260869565216
-    p = p * q - 0.047619047619047616
-    p = p * q + 0.05263157894736842
-    p = p * q - 0.058823529411764705
-    p = p * q + 0.06666666666666667
-    p = p * q - 0.07692307692307693
-    p = p * q + 0.09090909090909091
-    p = p * q - 0.1111111111111111
-    p = p * q + 0.14285714285714285
-    p = p * q - 0.2
-    p = p * q + 0.3333333333333333
+    p = -1.0 / 25.0
+    for factor in _OF_ARCTAN:
+        p = p * q + factor
     angle = 4.0 * (t - t * q * p)
     angle = 1.5707963267948966 - angle if inverted else angle
     return math.copysign(angle, x)

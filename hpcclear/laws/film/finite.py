@@ -26,6 +26,7 @@ SHORT_TO = 1.5
 DEGREES = (5, 14)  # in s, in sin(psi/2)
 _MODES, _ACROSS, _AROUND = 32, 64, 2048
 _NODES = (16, 28)  # eccentricities, angles of w
+_BELOW = tuple(range(13, -1, -1))
 
 
 def pressures(eccentricity: float, ratio: float) -> tuple[Array, Array]:
@@ -137,20 +138,8 @@ def finite_scales(a, s2):
 def polynomial(par, row, y, i, W):
     """Of degree 14, from coefficients in the rows from `row` on."""
     p = par[(row + 14) * W + i]
-    p = p * y + par[(row + 13) * W + i]
-    p = p * y + par[(row + 12) * W + i]
-    p = p * y + par[(row + 11) * W + i]
-    p = p * y + par[(row + 10) * W + i]
-    p = p * y + par[(row + 9) * W + i]
-    p = p * y + par[(row + 8) * W + i]
-    p = p * y + par[(row + 7) * W + i]
-    p = p * y + par[(row + 6) * W + i]
-    p = p * y + par[(row + 5) * W + i]
-    p = p * y + par[(row + 4) * W + i]
-    p = p * y + par[(row + 3) * W + i]
-    p = p * y + par[(row + 2) * W + i]
-    p = p * y + par[(row + 1) * W + i]
-    p = p * y + par[(row + 0) * W + i]
+    for k in _BELOW:
+        p = p * y + par[(row + k) * W + i]
     return p
 
 
@@ -158,11 +147,8 @@ def polynomial(par, row, y, i, W):
 def corrected(par, row, s2, x, y, i, W):
     """Force of a finite film over that of a short one, by 6 times 15 coefficients from `row` on (`correction`)."""
     p = polynomial(par, row + 75, y, i, W)
-    p = p * x + polynomial(par, row + 60, y, i, W)
-    p = p * x + polynomial(par, row + 45, y, i, W)
-    p = p * x + polynomial(par, row + 30, y, i, W)
-    p = p * x + polynomial(par, row + 15, y, i, W)
-    p = p * x + polynomial(par, row, y, i, W)
+    for first in (60, 45, 30, 15, 0):
+        p = p * x + polynomial(par, row + first, y, i, W)
     return s2 / p
 
 
