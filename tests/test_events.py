@@ -7,9 +7,9 @@ import pytest
 from scenes import ensemble, scene
 
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.stepping.events import absolute_integral, hermite, root
 from hpcclear.dynamics.stepping.explicit.tableau import PRINCE_DORMAND, TSITOURAS, Tableau
 from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.stops import absolute_integral, hermite, root
 
 
 def cubics(count: int):

@@ -9,7 +9,7 @@ import math
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.control import count_up, place
-from hpcclear.dynamics.stepping.events import hermite, hermite_integral, interior_peak
+from hpcclear.dynamics.stepping.stops import hermite, hermite_integral, interior_peak
 
 NEAR = 1.2
 """A peak above so many times the larger value at the ends of a step is not found: it would be a step that resolves nothing."""

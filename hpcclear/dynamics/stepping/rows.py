@@ -8,17 +8,9 @@ import math
 
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.curves import (
-    BREAK_COUNT,
-    BREAKS,
-    HEAD,
-    IN_PARAMETERS,
-    PLACES,
-    REPEATS,
-)
+from hpcclear.dynamics.layout import curves
 from hpcclear.dynamics.stepping.control import row_reach
-from hpcclear.dynamics.stepping.events import impact_fraction
-from hpcclear.dynamics.stepping.stops import cut
+from hpcclear.dynamics.stepping.stops import cut, impact_fraction
 
 FAR = 1e300
 
@@ -69,14 +61,16 @@ def stop_at_rows(rules, lane, W, work):
 @lane_event
 def row_of(lane, W, par, tables, c, k):
     """Where row k of table c stands: a share of its length, or what the sample's parameters say."""
-    row = tables[(int(tables[HEAD * c + BREAKS]) + k) & PLACES]
-    return par[int(row) * W + lane] if tables[HEAD * c + IN_PARAMETERS] == 1.0 else row
+    row = tables[(int(tables[curves.HEAD * c + curves.BREAKS]) + k) & curves.PLACES]
+    return (
+        par[int(row) * W + lane] if tables[curves.HEAD * c + curves.IN_PARAMETERS] == 1.0 else row
+    )
 
 
 @lane_event
 def row_before(lane, W, par, tables, c, place):
     """Number of the last row at or before a place, -1 of none."""
-    low, high = -1, int(tables[HEAD * c + BREAK_COUNT])
+    low, high = -1, int(tables[curves.HEAD * c + curves.BREAK_COUNT])
     while high - low > 1:
         middle = (low + high) // 2
         if row_of(lane, W, par, tables, c, middle) <= place:
@@ -89,10 +83,10 @@ def row_before(lane, W, par, tables, c, place):
 @lane_event
 def row_at(lane, W, par, tables, c, k):
     """The same; of rows before the first and behind the last, a length off or nowhere."""
-    count = int(tables[HEAD * c + BREAK_COUNT])
+    count = int(tables[curves.HEAD * c + curves.BREAK_COUNT])
     if 0 <= k < count:
         return row_of(lane, W, par, tables, c, k)
-    if tables[HEAD * c + REPEATS] == 0.0:
+    if tables[curves.HEAD * c + curves.REPEATS] == 0.0:
         return FAR if k > 0 else -FAR
     further = 1.0 if k > 0 else -1.0
     return row_of(lane, W, par, tables, c, k - int(further) * count) + further
@@ -104,7 +98,7 @@ def next_rows(lane, W, work, par, tables, c):
 
     The first row of a table that repeats is at 0, so that no place between two rows is a length off.
     """
-    count = int(tables[HEAD * c + BREAK_COUNT])
+    count = int(tables[curves.HEAD * c + curves.BREAK_COUNT])
     ahead, behind = FAR, -FAR
     if count > 0:
         place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
@@ -112,11 +106,11 @@ def next_rows(lane, W, work, par, tables, c):
         onward = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + lane] >= 0.0
         place += reach if onward else -reach
         k = row_before(lane, W, par, tables, c, place)
-        if tables[HEAD * c + REPEATS] == 1.0 and place >= 1.0:
+        if tables[curves.HEAD * c + curves.REPEATS] == 1.0 and place >= 1.0:
             k = count
         behind = row_at(lane, W, par, tables, c, k)
         ahead = row_at(lane, W, par, tables, c, k + 1)
-        if tables[HEAD * c + IN_PARAMETERS] == 1.0 and 0 <= k < count - 1:
+        if tables[curves.HEAD * c + curves.IN_PARAMETERS] == 1.0 and 0 <= k < count - 1:
             part = (ahead - behind) / PARTS
             last = row_of(lane, W, par, tables, c, count - 1)
             if ahead - behind < NARROW * (last - row_of(lane, W, par, tables, c, 0)):

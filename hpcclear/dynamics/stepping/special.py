@@ -12,15 +12,9 @@ from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Counter, Queue, block_at, rules_in
 from hpcclear.dynamics.layout.views import Outcome, RunSettings, Start
+from hpcclear.dynamics.stepping import stops
 from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.stops import (
-    integrate_gap,
-    stop_at_impacts,
-    stop_at_kinks,
-    stop_free_crank,
-    wrap_angles,
-)
 
 NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION, END_OF_SAMPLE = range(4)
 """What may be requested; the status of a sample that ends stands in `FOUND`."""
@@ -43,14 +37,14 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
         if rules.curves > 0:  # first: contacts are latched at the ends of steps that stay
             stop_at_rows(rules, lane, W, work)
         if rules.latched and work[at.ACCEPT * W + lane] == 1.0:
-            stop_at_impacts(rules, lane, W, work, settings)
+            stops.stop_at_impacts(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0:
-            stop_at_kinks(rules, lane, W, work, settings)
+            stops.stop_at_kinks(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0 and rules.free:
-            status = stop_free_crank(lane, W, block, settings, n - 1)
+            status = stops.stop_free_crank(lane, W, block, settings, n - 1)
         if work[at.ACCEPT * W + lane] == 1.0:
             for p in range(rules.begin, rules.end):
-                integrate_gap(lane, W, work, p)
+                stops.integrate_gap(lane, W, work, p)
             for c in range(rules.curves):
                 next_rows(lane, W, work, block.par, tables, c)
     return status
@@ -71,7 +65,7 @@ def answer(numbers, rules, block, queue, settings, tables):
         status = end_of_step(rules, lane, W, n, block, settings, tables)
         ends = status != OK
     elif asked == END_OF_REVOLUTION:
-        wrap_angles(lane, W, n, block.work, settings)
+        stops.wrap_angles(lane, W, n, block.work, settings)
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
     elif asked == END_OF_SAMPLE:

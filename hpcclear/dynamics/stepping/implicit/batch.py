@@ -15,53 +15,9 @@ from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Stepped, block_at, rules_in
 from hpcclear.dynamics.layout.views import RunSettings
+from hpcclear.dynamics.stepping.implicit import columns, control, kinks, newton
 from hpcclear.dynamics.stepping.implicit import memory as mem
-from hpcclear.dynamics.stepping.implicit.columns import (
-    adopt_start,
-    begin_column,
-    bring_back,
-    flag,
-    gap_errors,
-    holds,
-    is_new,
-    leave,
-    owner,
-    settle_columns,
-)
-from hpcclear.dynamics.stepping.implicit.control import (
-    KINK_REACH,
-    LEAST_CUT,
-    MOST_CUTS,
-    cut_again,
-    forget_kinks,
-    give_up,
-    propose,
-    root_of,
-)
-from hpcclear.dynamics.stepping.implicit.kinks import (
-    BEYOND,
-    GUESSED_BEYOND,
-    after_functions,
-    crossing,
-    first_function,
-    kink_functions,
-)
 from hpcclear.dynamics.stepping.implicit.memory import ALL_KINKS, COLUMNS, STAGES, Moved, N
-from hpcclear.dynamics.stepping.implicit.newton import (
-    evaluate_stages,
-    filtered_error,
-    guess,
-    guess_from_start,
-    least,
-    make_inverses,
-    most,
-    new_jacobian,
-    newton,
-    number,
-    observe_stages,
-    refilter_error,
-    start_of_step,
-)
 
 
 @lane_function
@@ -85,11 +41,11 @@ def begin_function(latched, m, f):
 def begin_kinks(rules, m):
     """Keep the kink functions where steps begin; what was learnt before one has changed its sign is forgotten."""
     put(m, mem.NOW, spread(0.0))
-    for f in range(first_function(rules), after_functions(rules)):
+    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
         begin_function(rules.latched, m, f)
     for i in range(COLUMNS):
         if m[mem.NOW * COLUMNS + i] > 0.0:
-            forget_kinks(m, i)
+            control.forget_kinks(m, i)
 
 
 @lane_function
@@ -107,19 +63,19 @@ def begin_steps(effects, moved, W, block, m, settings):
     """Bring the starts of all columns' steps into them."""
     unknown = False
     for i in range(COLUMNS):
-        lane = owner(m, i)
-        if lane >= 0 and begin_column(effects, moved, lane, W, block, m, i, settings):
+        lane = columns.owner(m, i)
+        if lane >= 0 and columns.begin_column(effects, moved, lane, W, block, m, i, settings):
             unknown = True
     if unknown:
-        start_of_step(moved, m)
-        kink_functions(effects.rules, m, mem.STAGE_KINKS)
+        newton.start_of_step(moved, m)
+        kinks.kink_functions(effects.rules, m, mem.STAGE_KINKS)
     for i in range(COLUMNS):
-        lane = owner(m, i)
-        if lane >= 0 and not holds(m, mem.KNOWN, i):
-            adopt_start(moved.n, lane, W, block, m, i)
+        lane = columns.owner(m, i)
+        if lane >= 0 and not columns.holds(m, mem.KNOWN, i):
+            columns.adopt_start(moved.n, lane, W, block, m, i)
     keep_polynomials(moved.n, m)
     begin_kinks(effects.rules, m)
-    tolerance = number(m, mem.TOLERANCE)
+    tolerance = newton.number(m, mem.TOLERANCE)
     for k in range(moved.n):
         for row, unit in ((at.Q + k, k), (at.V + k, N + k)):
             there = fetch(m, mem.LEAST + unit) + size(fetch(m, row))
@@ -131,31 +87,31 @@ def first_guess(moved, W, work, m):
     """First guess of all columns' stages."""
     news = False
     for i in range(COLUMNS):
-        lane = owner(m, i)
-        new = lane >= 0 and is_new(work, W, lane)
-        flag(m, mem.ASKED, i, new)
+        lane = columns.owner(m, i)
+        new = lane >= 0 and columns.is_new(work, W, lane)
+        columns.flag(m, mem.ASKED, i, new)
         news = news or new
     if news:
-        guess_from_start(moved.n, m)
+        newton.guess_from_start(moved.n, m)
     for i in range(COLUMNS):
-        lane = owner(m, i)
+        lane = columns.owner(m, i)
         if lane >= 0:
-            if holds(m, mem.ASKED, i):
+            if columns.holds(m, mem.ASKED, i):
                 m[mem.POLYNOMIAL_STEP + i] = m[mem.STEP + i]
                 m[mem.CONTINUES + i] = 0.0
             work[at.STIFF_STEPS_HERE * W + lane] += 1.0
-        flag(m, mem.ASKED, i, lane >= 0 and not holds(m, mem.ASKED, i))
-    guess(moved.n, m)
+        columns.flag(m, mem.ASKED, i, lane >= 0 and not columns.holds(m, mem.ASKED, i))
+    newton.guess(moved.n, m)
 
 
 @scalar_function
 def show_kinks(rules, m):
     """Where one of the stages lies beyond a kink, to mem.SHOWN: below 0."""
     shown = spread(1.0)
-    for f in range(first_function(rules), after_functions(rules)):
+    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
         start = fetch(m, mem.START_KINKS + f)
         for s in range(STAGES):
-            shown = least(shown, start * fetch(m, mem.STAGE_KINKS + s * ALL_KINKS + f))
+            shown = newton.least(shown, start * fetch(m, mem.STAGE_KINKS + s * ALL_KINKS + f))
     put(m, mem.SHOWN, shown)
 
 
@@ -169,43 +125,43 @@ def kink_fraction(rules, m, i, beyond):
     first = 2.0
     if not m[mem.SHOWN * COLUMNS + i] < 0.0:
         return first
-    for f in range(first_function(rules), after_functions(rules)):
+    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
         start = m[(mem.START_KINKS + f) * COLUMNS + i]
         one = m[(mem.STAGE_KINKS + f) * COLUMNS + i]
         two = m[(mem.STAGE_KINKS + ALL_KINKS + f) * COLUMNS + i]
         three = m[(mem.STAGE_KINKS + 2 * ALL_KINKS + f) * COLUMNS + i]
-        first = min(first, crossing(start, one, two, three, beyond))
+        first = min(first, kinks.crossing(start, one, two, three, beyond))
     return first
 
 
 @scalar_function
 def cut_at_kinks(effects, moved, W, work, m):
     """Evaluate the guessed stages, and cut the steps that show a kink."""
-    observe_stages(effects, moved, m, False)
+    newton.observe_stages(effects, moved, m, False)
     show_kinks(effects.rules, m)
     any_cut = False
     for i in range(COLUMNS):
-        lane = owner(m, i)
-        flag(m, mem.ASKED, i, False)
+        lane = columns.owner(m, i)
+        columns.flag(m, mem.ASKED, i, False)
         if lane >= 0:
             work[at.EVALUATIONS * W + lane] += 3.0
             guessed = m[mem.POLYNOMIAL_STEP + i] > 0.0
-            fraction = kink_fraction(effects.rules, m, i, GUESSED_BEYOND) if guessed else 2.0
+            fraction = kink_fraction(effects.rules, m, i, kinks.GUESSED_BEYOND) if guessed else 2.0
             if fraction < 1.0:
                 h = m[mem.STEP + i]
                 m[mem.POLYNOMIAL_STEP + i] = h
-                h *= max(fraction, LEAST_CUT)
+                h *= max(fraction, control.LEAST_CUT)
                 m[mem.STEP + i] = h
                 work[at.STEP * W + lane] = h
                 work[at.ENDING * W + lane] = 0.0
                 work[at.RESUMED * W + lane] = 0.0
                 m[mem.CONTINUES + i] = 0.0
                 work[at.EVALUATIONS * W + lane] += 3.0
-                flag(m, mem.ASKED, i, True)
+                columns.flag(m, mem.ASKED, i, True)
                 any_cut = True
     if any_cut:
-        guess(moved.n, m)
-        evaluate_stages(moved, m)
+        newton.guess(moved.n, m)
+        newton.evaluate_stages(moved, m)
 
 
 @scalar_function
@@ -219,25 +175,25 @@ def norms_of_jacobians(n, m):
             row_q = row_q + unit * size(fetch(m, mem.BY_Q + r * N + k))
             row_v = row_v + unit * size(fetch(m, mem.BY_V + r * N + k))
         inverse = 1.0 / fetch(m, mem.LEAST + N + r)
-        by_q, by_v = most(by_q, row_q * inverse), most(by_v, row_v * inverse)
+        by_q, by_v = newton.most(by_q, row_q * inverse), newton.most(by_v, row_v * inverse)
     put(m, mem.NORM // COLUMNS, by_v)
     put(m, mem.NOW, by_q)
     for i in range(COLUMNS):
-        m[mem.NORM + i] += root_of(m[mem.NOW * COLUMNS + i])
+        m[mem.NORM + i] += control.root_of(m[mem.NOW * COLUMNS + i])
 
 
 @scalar_function
 def solve_steps(effects, moved, W, work, m):
     """Solve for the stages of all columns: the outcome is in mem.ITERATIONS."""
     cut_at_kinks(effects, moved, W, work, m)
-    new_jacobian(moved, m)
+    newton.new_jacobian(moved, m)
     norms_of_jacobians(moved.n, m)
-    make_inverses(moved.n, m)
+    newton.make_inverses(moved.n, m)
     for i in range(COLUMNS):
-        flag(m, mem.ASKED, i, owner(m, i) >= 0)
-    newton(moved, m)
+        columns.flag(m, mem.ASKED, i, columns.owner(m, i) >= 0)
+    newton.newton(moved, m)
     for i in range(COLUMNS):
-        lane = owner(m, i)
+        lane = columns.owner(m, i)
         if lane >= 0:
             again = abs(m[mem.ITERATIONS * COLUMNS + i]) - 1.0
             work[at.EVALUATIONS * W + lane] += 2.0 * moved.n + 3.0 * again
@@ -249,19 +205,19 @@ def estimate_errors(moved, W, work, m):
     for k in range(moved.n):
         put(m, mem.SHIFTED + k, fetch(m, mem.START + k))
         put(m, mem.SHIFTED + N + k, spread(0.0))
-    filtered_error(moved.n, m)
+    newton.filtered_error(moved.n, m)
     again = False
     for i in range(COLUMNS):
-        lane = owner(m, i)
-        flag(m, mem.ASKED, i, False)
+        lane = columns.owner(m, i)
+        columns.flag(m, mem.ASKED, i, False)
         if lane >= 0:
             uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP + i] == 0.0
             if m[mem.NOW * COLUMNS + i] > 2.0 * moved.n and uneasy:
                 work[at.EVALUATIONS * W + lane] += 1.0
-                flag(m, mem.ASKED, i, True)
+                columns.flag(m, mem.ASKED, i, True)
                 again = True
     if again:
-        refilter_error(moved, m)
+        newton.refilter_error(moved, m)
 
 
 @scalar_function
@@ -269,23 +225,23 @@ def end_column(effects, moved, lane, W, work, m, i):
     """What a column's step has come to: its end, its error and the step to try next."""
     iterations = m[mem.ITERATIONS * COLUMNS + i]
     if iterations < 0.0:
-        bring_back(moved.n, m, i)
-        give_up(lane, W, work, m, i)
+        columns.bring_back(moved.n, m, i)
+        control.give_up(lane, W, work, m, i)
         return
     work[at.EVALUATIONS * W + lane] += 3.0
     m[mem.POLYNOMIAL_STEP + i] = m[mem.STEP + i]
     m[mem.CONTINUES + i] = 0.0
-    fraction = kink_fraction(effects.rules, m, i, BEYOND)
-    if fraction < 1.0 - KINK_REACH and m[mem.KINK_CUTS + i] < MOST_CUTS:
-        cut_again(lane, W, work, m, i, fraction)
+    fraction = kink_fraction(effects.rules, m, i, kinks.BEYOND)
+    if fraction < 1.0 - control.KINK_REACH and m[mem.KINK_CUTS + i] < control.MOST_CUTS:
+        control.cut_again(lane, W, work, m, i, fraction)
         return
     m[mem.KINK_CUTS + i] = 0.0
-    total = m[mem.NOW * COLUMNS + i] + gap_errors(effects.rules, lane, W, work, m, i)
-    leave(effects, moved.n, lane, W, work, m, i)
+    total = m[mem.NOW * COLUMNS + i] + columns.gap_errors(effects.rules, lane, W, work, m, i)
+    columns.leave(effects, moved.n, lane, W, work, m, i)
     mean = total * (0.5 / moved.n)
-    m[mem.TRIED_ERROR + i] = root_of(mean)
+    m[mem.TRIED_ERROR + i] = control.root_of(mean)
     work[at.ERROR * W + lane] = mean
-    propose(lane, W, work, m, i, iterations)
+    control.propose(lane, W, work, m, i, iterations)
 
 
 @scalar_function
@@ -296,10 +252,10 @@ def eight_steps(effects, moved, W, block, m, settings):
     solve_steps(effects, moved, W, block.work, m)
     estimate_errors(moved, W, block.work, m)
     # as the last correction left them: integrals and kinks fit the end of the step
-    observe_stages(effects, moved, m, True)
+    newton.observe_stages(effects, moved, m, True)
     show_kinks(effects.rules, m)
     for i in range(COLUMNS):
-        lane = owner(m, i)
+        lane = columns.owner(m, i)
         if lane >= 0:
             end_column(effects, moved, lane, W, block.work, m, i)
 
@@ -309,7 +265,7 @@ def is_held(m):
     """Whether a lane is in one of the columns."""
     held = False
     for i in range(COLUMNS):
-        held = held or owner(m, i) >= 0
+        held = held or columns.owner(m, i) >= 0
     return held
 
 
@@ -327,7 +283,7 @@ def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
         carray(tables, at.MAX_CURVES),
     )
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
-    settle_columns(block.work, W, eights)
+    columns.settle_columns(block.work, W, eights)
     for e in range(len(eights)):
         if is_held(eights[e]):
             eight_steps(effects, moved, W, block, eights[e], carray(settings, RunSettings.size))

@@ -12,22 +12,11 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import run_motion, run_observed
 from hpcclear.dynamics.stepping.control import measure, place
 from hpcclear.dynamics.stepping.implicit import memory as mem
+from hpcclear.dynamics.stepping.implicit import radau as rad
 from hpcclear.dynamics.stepping.implicit.control import MAX_ITERATIONS, begin_iteration, rate_of
 from hpcclear.dynamics.stepping.implicit.inverses import invert_complex, invert_real
 from hpcclear.dynamics.stepping.implicit.kinks import kink_functions
 from hpcclear.dynamics.stepping.implicit.memory import ALL_KINKS, COLUMNS, STAGES, N
-from hpcclear.dynamics.stepping.implicit.radau import (
-    ERROR_BY_MATRIX,
-    ERROR_WEIGHTS,
-    MATRIX,
-    MU,
-    MU_IM,
-    MU_RE,
-    NODES,
-    T_INVERSE,
-    T,
-    weights_at,
-)
 
 RELATIVE = 1.5e-8  # of a difference: square root of the round-off
 
@@ -64,13 +53,13 @@ def start_of_step(moved, m):
 def put_stage(n, m, s):
     """Time, coordinates and velocities of stage s, from the increments of the velocities."""
     h = number(m, mem.STEP)
-    put(m, at.STAGE_TIME, number(m, mem.TIME) + NODES[s] * h)
+    put(m, at.STAGE_TIME, number(m, mem.TIME) + rad.NODES[s] * h)
     for k in range(n):
         v, z = fetch(m, at.V + k), mem.Z + k
-        total = MATRIX[s, 0] * fetch(m, z) + MATRIX[s, 1] * fetch(m, z + N)
-        total = total + MATRIX[s, 2] * fetch(m, z + 2 * N)
+        total = rad.MATRIX[s, 0] * fetch(m, z) + rad.MATRIX[s, 1] * fetch(m, z + N)
+        total = total + rad.MATRIX[s, 2] * fetch(m, z + 2 * N)
         put(m, at.VS + k, v + fetch(m, z + s * N))
-        put(m, at.QS + k, fetch(m, at.Q + k) + h * (NODES[s] * v + total))
+        put(m, at.QS + k, fetch(m, at.Q + k) + h * (rad.NODES[s] * v + total))
 
 
 @scalar_function
@@ -103,11 +92,11 @@ def observe_stages(effects, moved, m, integrated):
         if integrated:
             for joint in range(rules.begin, rules.end):
                 gap = at.GAP + place(joint)
-                add_rate(m, mem.MEAN + gap, gap, MATRIX[2, s], s == 0)
-                add_rate(m, mem.GAP_ERROR + place(joint), gap, ERROR_BY_MATRIX[s], s == 0)
+                add_rate(m, mem.MEAN + gap, gap, rad.MATRIX[2, s], s == 0)
+                add_rate(m, mem.GAP_ERROR + place(joint), gap, rad.ERROR_BY_MATRIX[s], s == 0)
             for r in range(len(effects.measures)):
                 rate = measure(effects, r)
-                add_rate(m, mem.MEAN + rate, rate, MATRIX[2, s], s == 0)
+                add_rate(m, mem.MEAN + rate, rate, rad.MATRIX[2, s], s == 0)
 
 
 @scalar_function
@@ -122,7 +111,7 @@ def guess(n, m):
         row = mem.Z + k
         z0, z1, z2 = fetch(m, row), fetch(m, row + N), fetch(m, row + 2 * N)
         for s in range(STAGES):
-            w0, w1, w2 = weights_at(after + NODES[s] * ratio)
+            w0, w1, w2 = rad.weights_at(after + rad.NODES[s] * ratio)
             found = w0 * z0 + w1 * z1 + (w2 - after) * z2
             found = above(old, found, spread(0.0))
             put(m, row + s * N, above(asked, found, fetch(m, row + s * N)))
@@ -137,7 +126,7 @@ def guess_from_start(n, m):
         a = h * fetch(m, mem.START + k)
         for s in range(STAGES):
             row = mem.Z + s * N + k
-            put(m, row, above(asked, NODES[s] * a, fetch(m, row)))
+            put(m, row, above(asked, rad.NODES[s] * a, fetch(m, row)))
     decouple(n, m)
 
 
@@ -149,7 +138,11 @@ def decouple(n, m):
         z0, z1, z2 = fetch(m, z), fetch(m, z + N), fetch(m, z + 2 * N)
         for s in range(STAGES):
             row = mem.TRANSFORMED + s * N + k
-            put(m, row, T_INVERSE[s, 0] * z0 + T_INVERSE[s, 1] * z1 + T_INVERSE[s, 2] * z2)
+            put(
+                m,
+                row,
+                rad.T_INVERSE[s, 0] * z0 + rad.T_INVERSE[s, 1] * z1 + rad.T_INVERSE[s, 2] * z2,
+            )
 
 
 @lane_function
@@ -180,15 +173,15 @@ def new_jacobian(moved, m):
 def make_inverses(n, m):
     """Inverses of the real and the complex systems of the step."""
     h = number(m, mem.STEP)
-    square = MU_RE * MU_RE + MU_IM * MU_IM
+    square = rad.MU_RE * rad.MU_RE + rad.MU_IM * rad.MU_IM
     for r in range(n):
         for c in range(n):
             i = r * N + c
             by_q, less = fetch(m, mem.BY_Q + i), spread(0.0) - fetch(m, mem.BY_V + i)
-            real, re = less - (h * (1.0 / MU)) * by_q, less - (h * (MU_RE / square)) * by_q
-            im = (h * (MU_IM / square)) * by_q
+            real, re = less - (h * (1.0 / rad.MU)) * by_q, less - (h * (rad.MU_RE / square)) * by_q
+            im = (h * (rad.MU_IM / square)) * by_q
             if r == c:
-                real, re, im = real + MU / h, re + MU_RE / h, im + MU_IM / h
+                real, re, im = real + rad.MU / h, re + rad.MU_RE / h, im + rad.MU_IM / h
             put(m, mem.REAL + i, real)
             put(m, mem.COMPLEX_RE + i, re)
             put(m, mem.COMPLEX_IM + i, im)
@@ -199,14 +192,14 @@ def make_inverses(n, m):
 @lane_function
 def residuals(n, m, inverse):
     """What is left of the decoupled equations, to mem.CHANGE; `inverse`: of the step."""
-    lam, re, im = MU * inverse, MU_RE * inverse, MU_IM * inverse
+    lam, re, im = rad.MU * inverse, rad.MU_RE * inverse, rad.MU_IM * inverse
     for k in range(n):
         f, w, change = mem.STAGE_ACC + k, mem.TRANSFORMED + k, mem.CHANGE + k
         f0, f1, f2 = fetch(m, f), fetch(m, f + N), fetch(m, f + 2 * N)
         w0, w1, w2 = fetch(m, w), fetch(m, w + N), fetch(m, w + 2 * N)
-        r0 = T_INVERSE[0, 0] * f0 + T_INVERSE[0, 1] * f1 + T_INVERSE[0, 2] * f2
-        r1 = T_INVERSE[1, 0] * f0 + T_INVERSE[1, 1] * f1 + T_INVERSE[1, 2] * f2
-        r2 = T_INVERSE[2, 0] * f0 + T_INVERSE[2, 1] * f1 + T_INVERSE[2, 2] * f2
+        r0 = rad.T_INVERSE[0, 0] * f0 + rad.T_INVERSE[0, 1] * f1 + rad.T_INVERSE[0, 2] * f2
+        r1 = rad.T_INVERSE[1, 0] * f0 + rad.T_INVERSE[1, 1] * f1 + rad.T_INVERSE[1, 2] * f2
+        r2 = rad.T_INVERSE[2, 0] * f0 + rad.T_INVERSE[2, 1] * f1 + rad.T_INVERSE[2, 2] * f2
         put(m, change, r0 - lam * w0)
         put(m, change + N, r1 - (re * w1 - im * w2))
         put(m, change + 2 * N, r2 - (re * w2 + im * w1))
@@ -236,7 +229,7 @@ def correct(n, m):
     total = spread(0.0)
     for r in range(n):
         x, y, z = solved(n, m, r)
-        by_q = (h * (1.0 / MU)) * fetch(m, mem.INVERSE_SCALE + r)
+        by_q = (h * (1.0 / rad.MU)) * fetch(m, mem.INVERSE_SCALE + r)
         by_v = fetch(m, mem.INVERSE_SCALE + N + r)
         total = total + (by_v * by_v + by_q * by_q) * (x * x + y * y + z * z)
         row = mem.TRANSFORMED + r
@@ -245,7 +238,7 @@ def correct(n, m):
         put(m, row + N, w1)
         put(m, row + 2 * N, w2)
         for s in range(STAGES):
-            found, z_row = T[s, 0] * w0 + T[s, 1] * w1 + T[s, 2] * w2, mem.Z + s * N + r
+            found, z_row = rad.T[s, 0] * w0 + rad.T[s, 1] * w1 + rad.T[s, 2] * w2, mem.Z + s * N + r
             put(m, z_row, above(asked, found, fetch(m, z_row)))
     put(m, mem.NOW, total)
 
@@ -301,12 +294,12 @@ def filtered_error(n, m):
     """
     by_v, by_q, result = mem.CHANGE, mem.CHANGE + N, mem.CHANGE + 2 * N
     h = number(m, mem.STEP)
-    inverse, scaled = 1.0 / h, h * (1.0 / MU)
+    inverse, scaled = 1.0 / h, h * (1.0 / rad.MU)
     for k in range(n):
         z = mem.Z + k
         z0, z1, z2 = fetch(m, z), fetch(m, z + N), fetch(m, z + 2 * N)
-        q = ERROR_BY_MATRIX[0] * z0 + ERROR_BY_MATRIX[1] * z1 + ERROR_BY_MATRIX[2] * z2
-        v = ERROR_WEIGHTS[0] * z0 + ERROR_WEIGHTS[1] * z1 + ERROR_WEIGHTS[2] * z2
+        q = rad.ERROR_BY_MATRIX[0] * z0 + rad.ERROR_BY_MATRIX[1] * z1 + rad.ERROR_BY_MATRIX[2] * z2
+        v = rad.ERROR_WEIGHTS[0] * z0 + rad.ERROR_WEIGHTS[1] * z1 + rad.ERROR_WEIGHTS[2] * z2
         put(m, by_q + k, fetch(m, mem.SHIFTED + N + k) + q)
         put(m, by_v + k, fetch(m, mem.SHIFTED + k) + inverse * v)
     for k in range(n):
