@@ -8,9 +8,8 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.wear.curves import THROUGH, Curves, curves, lifetime, local_bounds
+from hpcclear.dynamics.wear.curves import THROUGH, Curves, Life, curves, lifetime, local_bounds
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.results import dataset
 from hpcclear.results.content import Results

@@ -13,11 +13,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.setup.further import wave_paths
-from hpcclear.dynamics.wear.curves import DEEPEST
+from hpcclear.dynamics.setup.parameters import wave_paths
+from hpcclear.dynamics.wear.curves import DEEPEST, Life
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Asking, LifePlan, WearOutcome, life
-from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of

@@ -9,14 +9,7 @@ import math
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.forces import (
-    lost,
-    normal_force,
-    product,
-    store_contact,
-    swept,
-    tangential_force,
-)
+from hpcclear.dynamics.contacts import forces
 from hpcclear.dynamics.contacts.lubrication import film_of, pressed
 from hpcclear.dynamics.contacts.roundness import less, store_angles, tilted, waves_here
 
@@ -36,7 +29,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     bearing and journal about their own centres, and the dissipated power.
     """
     ex, ey, vx, vy, spin_journal, spin_bearing = relative
-    moving = ex, ey, vx, vy, swept(spin_journal, 1.0), swept(spin_bearing, 1.0)
+    moving = ex, ey, vx, vy, forces.swept(spin_journal, 1.0), forces.swept(spin_bearing, 1.0)
     block = joint.block
     square = ex * ex + ey * ey + _TINY
     distance = math.sqrt(square)
@@ -48,27 +41,29 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
     depth = no_less(gap, 0.0)
-    normal = normal_force(effects, work, par, joint, depth, rate, i, W)
+    normal = forces.normal_force(effects, work, par, joint, depth, rate, i, W)
     radius = less(effects.waves, par[(block + at.BEARING_RADIUS) * W + i], -here.bearing)
     arm_bearing = radius + 0.5 * depth
     radius = less(effects.waves, par[(block + at.JOURNAL_RADIUS) * W + i], here.journal)
     arm_journal = radius - 0.5 * depth
     across = vy * nx - vx * ny
-    sliding = across + swept(spin_journal, arm_journal) - swept(spin_bearing, arm_bearing)
+    sliding = (
+        across + forces.swept(spin_journal, arm_journal) - forces.swept(spin_bearing, arm_bearing)
+    )
     rubs = effects.friction
-    tangential = tangential_force(effects, work, par, joint, sliding, normal, i, W)
-    fx = normal * nx - product(rubs, tangential, ny)
-    fy = normal * ny + product(rubs, tangential, nx)
-    moment_bearing = product(rubs, tangential, arm_bearing)
-    moment_journal = product(rubs, tangential, arm_journal)
+    tangential = forces.tangential_force(effects, work, par, joint, sliding, normal, i, W)
+    fx = normal * nx - forces.product(rubs, tangential, ny)
+    fy = normal * ny + forces.product(rubs, tangential, nx)
+    moment_bearing = forces.product(rubs, tangential, arm_bearing)
+    moment_journal = forces.product(rubs, tangential, arm_journal)
     side = tilted(effects.waves, here, (nx, ny, inverse), normal)
-    touch, forces = (depth, rate, sliding), (normal, tangential)
-    loss = lost(effects, work, par, joint, touch, forces, i, W)
+    touch, pushes = (depth, rate, sliding), (normal, tangential)
+    loss = forces.lost(effects, work, par, joint, touch, pushes, i, W)
     oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     whole = pressed(effects.film_at[joint.place], normal, nx, ny, oil[0], oil[1])
     work[(at.RATE_NOW + joint.force) * W + i] = whole
-    store_contact(effects, work, par, joint, (touch, forces, (nx, ny)), i, W)
+    forces.store_contact(effects, work, par, joint, (touch, pushes, (nx, ny)), i, W)
     store_angles(effects, work, joint, here, i, W)
     return (
         fx + oil[0] + side[0],

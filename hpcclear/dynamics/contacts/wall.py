@@ -7,14 +7,7 @@ the overlap. The gap's rate follows from the motion of both bodies along the nor
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.forces import (
-    lost,
-    normal_force,
-    product,
-    store_contact,
-    swept,
-    tangential_force,
-)
+from hpcclear.dynamics.contacts import forces
 
 
 @apart
@@ -32,24 +25,26 @@ def wall_force(effects, work, par, joint, relative, touching, i, W):
     nx, ny, gap, half = touching
     radius = par[(joint.block + at.JOURNAL_RADIUS) * W + i]
     ahead = ey * nx - ex * ny  # along the wall
-    rate = vx * nx + vy * ny + swept(spin_bearing, ahead)
+    rate = vx * nx + vy * ny + forces.swept(spin_bearing, ahead)
     depth = no_less(gap, 0.0)
-    normal = normal_force(effects, work, par, joint, depth, rate, i, W)
+    normal = forces.normal_force(effects, work, par, joint, depth, rate, i, W)
     arm_journal = radius - 0.5 * depth
     arm_bearing = half + 0.5 * depth
     along = vy * nx - vx * ny
-    sliding = along + swept(spin_journal, arm_journal) - swept(spin_bearing, arm_bearing)
-    tangential = tangential_force(effects, work, par, joint, sliding, normal, i, W)
+    sliding = (
+        along + forces.swept(spin_journal, arm_journal) - forces.swept(spin_bearing, arm_bearing)
+    )
+    tangential = forces.tangential_force(effects, work, par, joint, sliding, normal, i, W)
     rubs = effects.friction
-    touch, forces = (depth, rate, sliding), (normal, tangential)
-    loss = lost(effects, work, par, joint, touch, forces, i, W)
+    touch, pushes = (depth, rate, sliding), (normal, tangential)
+    loss = forces.lost(effects, work, par, joint, touch, pushes, i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = normal
-    store_contact(effects, work, par, joint, (touch, forces, (nx, ny)), i, W)
+    forces.store_contact(effects, work, par, joint, (touch, pushes, (nx, ny)), i, W)
     return (
-        normal * nx - product(rubs, tangential, ny),
-        normal * ny + product(rubs, tangential, nx),
-        product(rubs, tangential, arm_bearing) - normal * ahead,
-        -product(rubs, tangential, arm_journal),
+        normal * nx - forces.product(rubs, tangential, ny),
+        normal * ny + forces.product(rubs, tangential, nx),
+        forces.product(rubs, tangential, arm_bearing) - normal * ahead,
+        -forces.product(rubs, tangential, arm_journal),
         loss,
     )

@@ -1,13 +1,14 @@
-"""What a load may use of the motion that it is written into (`base.terms.Acting`), written into a text."""
+"""What loads and geometries of contact may use of the motion that they are written into (`base.terms`), written into a text."""
 
 from collections.abc import Callable, Mapping, Sized
 
-from hpcclear.base.terms import ZERO, Acting, Term, Vector
+from hpcclear.base.terms import ZERO, Acting, Term, Touching, Vector, named
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
+from hpcclear.dynamics.linkage.closing import Closing
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics
+from hpcclear.dynamics.linkage.parts import Contact
 
 
 class LoadWriter(Acting):
@@ -67,12 +68,12 @@ class LoadWriter(Acting):
 
     def hinge(self, name: str, beyond: Term, slope: Term) -> Term:
         """A statement."""
-        return piecewise.hinge(self._writer, name, beyond, ZERO, slope)
+        return self._writer.hinge(name, beyond, ZERO, slope)
 
     def piecewise(self, rows: Sized, place: Term, rate: Term) -> Term:
         """Leaves place and rate in rows of the lanes, where steps end at the rows of the table."""
         row = self._places.get(self._load)
-        value = piecewise.term(self._writer, self._load, len(rows), place, row)
+        value = self._writer.table(self._load, len(rows), place, row)
         if row is not None:
             self._writer.line(f"work[{row + at.MAX_CURVES} * W + i] = {self._writer.text(rate)}")
         return value
@@ -84,3 +85,30 @@ class LoadWriter(Acting):
     def twist(self, body: str, torque: Term) -> None:
         """On the balance of forces."""
         self._balance.twists.append(Twist(body, torque))
+
+
+class ContactWriter(Touching):
+    """The terms of one contact."""
+
+    def __init__(self, closing: Closing, k: int, contact: Contact, apart: Vector) -> None:
+        self._closing, self._contact, self.apart = closing, contact, apart
+        rows = at.CLEARANCE, at.BEARING_RADIUS, at.JOURNAL_RADIUS
+        self.clearance, self.bearing_radius, self.journal_radius = (
+            named(f"par[(joints[{k}].block + {row}) * W + i]") for row in rows
+        )
+
+    @property
+    def across(self) -> Vector:
+        """Of the line in the frame of its body."""
+        return self._closing.direction(self._contact.joint).across()
+
+    def parameter(self, entry: str) -> Term:
+        """Named ``JOINT_ENTRY``."""
+        return self._closing.writer.parameter(f"{self._contact.joint.name}_{entry}")
+
+    def call(
+        self, function: Callable[..., object], *terms: Term, results: tuple[str, ...]
+    ) -> tuple[Term, ...]:
+        """A statement, with the contact in the names of its results."""
+        names = [f"{name}_{self._contact.word}" for name in results]
+        return self._closing.writer.call(function, terms, names)

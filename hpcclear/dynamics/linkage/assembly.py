@@ -1,5 +1,6 @@
 """Assembly of a mechanism from rough angles: Newton's method with the least change, and what to say where it fails."""
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight, uncentred
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import GROUND, Number, Pair, as_complex, places_of, split
-from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.dynamics.linkage.trees import Forest, forest
 
 MOST_STEPS = 40
 MOST_TRIES = 12
@@ -66,19 +67,10 @@ def assemble(mechanism: Mechanism) -> Assembly:
     jacobian = loops.at(q, np.zeros_like(q), np.zeros(1)).jacobian[0]
     check_rank(loops, jacobian, ideal_rows(mechanism, loops), 0.0)
     made = Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
-    return made if bare.bodies == mechanism.bodies else _about_centres(made, mechanism)
-
-
-def _about_centres(made: Assembly, mechanism: Mechanism) -> Assembly:
-    """The same with mass centres where a mechanism has them."""
-    loops = Loops(mechanism, closed=True)
-    q, v = made.q.copy(), made.v.copy()
-    for k, one in enumerate(loops.forest.coordinates):
-        if one.kind in ("x", "y"):
-            center = mechanism.body(one.body).center
-            here, speed, _, _ = placed(made, f"{one.body}.{CENTER}", center)
-            q[k], v[k] = (here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag)
-    return Assembly(loops, q, v, made.steps)
+    if bare.bodies == mechanism.bodies:
+        return made
+    about = Loops(mechanism, closed=True)
+    return Assembly(about, *coordinates(about.forest, made, mechanism), steps)
 
 
 def placed(
@@ -104,6 +96,50 @@ def placed(
     angle, spin = (0.0, 0.0) if turns is None else (q[turns], v[turns])
     turned = (here - as_complex(body.center)) * np.exp(1j * np.asarray(angle))
     return q[x] + 1j * q[y] + turned, v[x] + 1j * v[y] + 1j * spin * turned, angle, spin
+
+
+def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tuple[Array, Array]:
+    """Coordinates and velocities (n,) of a forest, of a linkage put together; (n, m) of samples.
+
+    Journals stand where the assembly (of the mechanism, or `uncentred`) has them; a coordinate along a guide is read off the
+    poses of both bodies. The mechanism says where the mass centres are: single ones, or those of samples (m,).
+    """
+    found: list[tuple[Number, Number]] = []
+    for one in forest.coordinates:
+        place = assembly.loops.forest.index(one.kind, one.body)
+        if one.kind == "slide":
+            found.append(_along(forest, assembly, one.body))
+        elif place is None:
+            found.append((0.0, 0.0))
+        elif one.kind == "angle":
+            found.append((assembly.q[place], assembly.v[place]))
+        else:
+            body = mechanism.body(one.body)
+            here, speed, _, _ = placed(assembly, f"{body.name}.{CENTER}", body.center)
+            found.append((here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag))
+    rows = np.broadcast_arrays(*itertools.chain(*found))
+    both = np.array(rows, float).reshape(
+        -1, 2, *np.shape(rows[0]) if rows else assembly.q.shape[1:]
+    )
+    return both[:, 0], both[:, 1]
+
+
+def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Number]:
+    """How far a body has come along its guide, m, and how fast it moves."""
+    hang = forest.hangs[body]
+    assert hang.joint is not None
+    own, own_speed, _, _ = placed(assembly, hang.own)
+    base, base_speed, _, _ = placed(assembly, hang.parent)
+    _, _, angle, spin = placed(assembly, hang.joint.point)
+    along = np.exp(1j * np.asarray(angle))
+    if hang.own != hang.joint.point:
+        along = -along
+    offset, rate = own - base, own_speed - base_speed
+    turned = 1j * along * spin
+    return (
+        (along.conjugate() * offset).real,
+        (along.conjugate() * rate).real + (turned.conjugate() * offset).real,
+    )
 
 
 def assemble_samples(

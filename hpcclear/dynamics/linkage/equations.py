@@ -3,7 +3,7 @@
 import keyword
 
 from hpcclear.base.terms import ONE, ZERO, Term, Vector, named
-from hpcclear.dynamics.linkage import piecewise
+from hpcclear.dynamics.linkage.acting import ContactWriter
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elements import functions
@@ -14,7 +14,6 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Contact, Drive, is_pin, split
 from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
-from hpcclear.dynamics.linkage.touching import ContactWriter
 from hpcclear.dynamics.linkage.trees import forest
 
 RESERVED = (
@@ -103,7 +102,7 @@ class MotionEquations:
         write = self.writer
         for name, rows in drive.straight.items():
             speed = self.kinematics.spin(self.forest.frames[drive.body])
-            torque = piecewise.term(write, name, len(rows), speed, self.rows.places.get(name))
+            torque = write.table(name, len(rows), speed, self.rows.places.get(name))
             return Mover("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:

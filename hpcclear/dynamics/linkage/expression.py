@@ -94,6 +94,29 @@ class Writer:
         self.line(f"{', '.join(made)} = {self.called(function)}({', '.join(texts)})")
         return tuple(map(named, made))
 
+    def table(self, name: str, count: int, where: Term, row: int | None) -> Term:
+        """The value at a place of a table of so many rows that runs straight from row to row and stays level beyond.
+
+        A sum of hinges, which lanes evaluate without a branch: its parameters are those of `base.pieces.hinges`, as rows may
+        differ from sample to sample. The place is left in a `row` of the lanes if there is one for it: steps end at the table's
+        rows (`stepping.rows`).
+        """
+        total = self.parameter(f"{name}_first")
+        place = self.let(f"at_{name}", where, whole=True)
+        if row is not None:
+            self.line(f"work[{row} * W + i] = {self.text(place)}")
+        for k in range(count):
+            start, bend = (self.parameter(f"{name}_{entry}_{k}") for entry in ("start", "bend"))
+            total = total + self.hinge(f"{name}_{k}", place, start, bend)
+        return total
+
+    def hinge(self, name: str, place: Term, start: Term, bend: Term) -> Term:
+        """A line of slope `bend` beyond `start`, 0 before."""
+        texts = [self.text(one) for one in (place, start, bend)]
+        made = self.fresh(name)
+        self.line(f"{made} = hinge({', '.join(texts)})")
+        return named(made)
+
     def line(self, text: str) -> None:
         """A statement as it stands; its names must have been written already (see `text`)."""
         self.lines.append(text)

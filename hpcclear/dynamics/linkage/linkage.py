@@ -10,13 +10,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
-from hpcclear.dynamics.linkage.generator import Motion, On, generate
-from hpcclear.dynamics.linkage.look_ups import curves_of
+from hpcclear.dynamics.linkage.generator import Motion, On, curves_of, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import Number
-from hpcclear.dynamics.linkage.piecewise import starts
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
@@ -123,7 +121,11 @@ class Linkage:
     def straight(self) -> dict[str, list[str]]:
         """Tables that run straight from row to row, and the parameters that say where they bend."""
         parts = (*self.mechanism.drives, *self.mechanism.loads)
-        return {name: starts(name, rows) for one in parts for name, rows in one.straight.items()}
+        return {
+            name: [f"{name}_start_{k}" for k in range(len(rows))]
+            for one in parts
+            for name, rows in one.straight.items()
+        }
 
     @property
     def bends(self) -> list[list[int]]:

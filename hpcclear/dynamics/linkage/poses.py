@@ -1,6 +1,5 @@
 """Where all bodies of a linkage are, and how fast they move, from the coordinates that are integrated; and the way back."""
 
-import itertools
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -8,12 +7,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.terms import ZERO, Term, named
-from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
-from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Number, is_pin
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -96,47 +93,3 @@ def _angle(kin: Kinematics, frame: str) -> Term:
         return ZERO
     drive = kin.forest.prescribed.get(frame)
     return named(f"angle_{frame}") if drive is None else kin.driven(drive, frame)[0]
-
-
-def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tuple[Array, Array]:
-    """Coordinates and velocities (n,) of a forest, of a linkage put together; (n, m) of samples.
-
-    Journals stand where the assembly (of the mechanism, or `uncentred`) has them; a coordinate along a guide is read off the
-    poses of both bodies. The mechanism says where the mass centres are: single ones, or those of samples (m,).
-    """
-    found: list[tuple[Number, Number]] = []
-    for one in forest.coordinates:
-        place = assembly.loops.forest.index(one.kind, one.body)
-        if one.kind == "slide":
-            found.append(_along(forest, assembly, one.body))
-        elif place is None:
-            found.append((0.0, 0.0))
-        elif one.kind == "angle":
-            found.append((assembly.q[place], assembly.v[place]))
-        else:
-            body = mechanism.body(one.body)
-            here, speed, _, _ = placed(assembly, f"{body.name}.{CENTER}", body.center)
-            found.append((here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag))
-    rows = np.broadcast_arrays(*itertools.chain(*found))
-    both = np.array(rows, float).reshape(
-        -1, 2, *np.shape(rows[0]) if rows else assembly.q.shape[1:]
-    )
-    return both[:, 0], both[:, 1]
-
-
-def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Number]:
-    """How far a body has come along its guide, m, and how fast it moves."""
-    hang = forest.hangs[body]
-    assert hang.joint is not None
-    own, own_speed, _, _ = placed(assembly, hang.own)
-    base, base_speed, _, _ = placed(assembly, hang.parent)
-    _, _, angle, spin = placed(assembly, hang.joint.point)
-    along = np.exp(1j * np.asarray(angle))
-    if hang.own != hang.joint.point:
-        along = -along
-    offset, rate = own - base, own_speed - base_speed
-    turned = 1j * along * spin
-    return (
-        (along.conjugate() * offset).real,
-        (along.conjugate() * rate).real + (turned.conjugate() * offset).real,
-    )

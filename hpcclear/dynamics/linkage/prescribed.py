@@ -15,7 +15,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, placed
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, coordinates, placed
 from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, on_arrays
@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
-from hpcclear.dynamics.linkage.poses import Poses, coordinates
+from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.rows import Rows
 
 Curves = Mapping[str, Callable[[Array], Array]]

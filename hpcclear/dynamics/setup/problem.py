@@ -11,8 +11,7 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.planar.tolerances import STIFF, absolute_tolerances, swings
-from hpcclear.dynamics.setup.further import parameter_rows
-from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.parameters import parameter_rows, parameters
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.stepping.implicit.control import STEEP
 from hpcclear.dynamics.stepping.problem import Problem

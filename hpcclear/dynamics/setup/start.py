@@ -8,23 +8,13 @@ from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.layout.views import Start
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples, coordinates
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, uncentred, with_numbers
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.passage import clear
-from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import Forest
-from hpcclear.dynamics.planar.problem import (
-    linkage_of,
-    moves_geometry,
-    moves_start,
-    put_together,
-    refused_of,
-    rounds_of,
-    sample_of,
-    scene_of,
-)
+from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.planar.turning import loops_of, passage, pinned, refused
 from hpcclear.scene import Scene
@@ -40,26 +30,26 @@ def start_states(
     `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`). Raises InputError if the
     scene itself does not close.
     """
-    trees = linkage_of(scene).forest
+    trees = planar.linkage_of(scene).forest
     first = scene.bristles  # which begin undeflected
     n = len(trees.coordinates)
     start = Start.at_rest(len(par))
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     moved = () if points is None else tuple(map(scene.path_in_linkage, sum(points.paths, ())))
     samples = None
-    if points is not None and any(map(moves_geometry, moved)):
+    if points is not None and any(map(planar.moves_geometry, moved)):
         samples = Samples(scene, points)
         places.T[:], speeds.T[:] = samples.coordinates(trees)
-    elif any(map(moves_start, moved)):  # mass centres alone
-        found = coordinates(trees, _assembled(scene), sample_of(scene, points))
+    elif any(map(planar.moves_start, moved)):  # mass centres alone
+        found = coordinates(trees, _assembled(scene), planar.sample_of(scene, points))
         places.T[:], speeds.T[:] = (one.reshape(n, -1) for one in found)
     else:
         places[:], speeds[:] = _of_scene(scene)
     if samples is None:
-        refusal = refused_of(scene) if walk else None
+        refusal = planar.refused_of(scene) if walk else None
         ended = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
-        ended = _statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
+        ended = _statuses(_twins(scene), samples, scene.effects.gravity, planar.rounds_of(scene))
     _start_contacts(scene, par, points, start)
     start.fail(ended)
     return start
@@ -69,12 +59,12 @@ def start_states(
 def _of_scene(scene: Scene) -> tuple[Array, Array]:
     """Coordinates and velocities (n,) that all samples start with whose geometry is the scene's."""
     mechanism = mechanism_of(scene.linkage)
-    return coordinates(linkage_of(scene).forest, _assembled(scene), mechanism)
+    return coordinates(planar.linkage_of(scene).forest, _assembled(scene), mechanism)
 
 
 @lru_cache(maxsize=16)
 def _assembled(scene: Scene) -> Assembly:
-    return put_together(uncentred(mechanism_of(scene.linkage)))
+    return planar.put_together(uncentred(mechanism_of(scene.linkage)))
 
 
 class Samples:
@@ -85,21 +75,21 @@ class Samples:
 
     def __init__(self, scene: Scene, points: Points) -> None:
         self._scene, self._points = _without_study(scene), points
-        structure = uncentred(linkage_of(scene).mechanism)
-        self.numbers = sample_of(scene, points)
+        structure = uncentred(planar.linkage_of(scene).mechanism)
+        self.numbers = planar.sample_of(scene, points)
         bare = uncentred(self.numbers)
         self._made, self.closed = assemble_samples(structure, bare, len(points))
         self._single: dict[int, Assembly] = {}
         for row in np.flatnonzero(~self.closed).tolist():
             try:
-                self._single[row] = put_together(uncentred(self.mechanism(row)))
+                self._single[row] = planar.put_together(uncentred(self.mechanism(row)))
                 self.closed[row] = True
             except InputError:
                 continue
 
     def mechanism(self, row: int) -> Mechanism:
         """One sample by itself."""
-        return mechanism_of(scene_of(self._scene, self._points, row).linkage)
+        return mechanism_of(planar.scene_of(self._scene, self._points, row).linkage)
 
     def coordinates(self, forest: Forest) -> tuple[Array, Array]:
         """Coordinates and velocities (n, m) of a forest; NaN of samples that do not close."""
@@ -143,7 +133,7 @@ def _clear(loops: Loops, samples: Samples) -> Booleans:
 
 @lru_cache(maxsize=16)
 def _twins(scene: Scene) -> Loops | None:
-    return loops_of(linkage_of(scene).mechanism)
+    return loops_of(planar.linkage_of(scene).mechanism)
 
 
 @lru_cache(maxsize=16)
@@ -157,7 +147,7 @@ def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Star
     law = scene.effects.contact
     if law is None or not law.latched:
         return
-    gaps = [gap for joint in sample_of(scene, points).clearances for gap in joint.gaps()]
+    gaps = [gap for joint in planar.sample_of(scene, points).clearances for gap in joint.gaps()]
     for k, gap in zip(scene.open_places, gaps, strict=True):
         touching = np.asarray(gap) >= 0.0
         start.active[:, k] = touching

@@ -22,9 +22,8 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
 from hpcclear.base.student import student
-from hpcclear.dynamics.wear.curves import THROUGH, first_passed, local_bounds
+from hpcclear.dynamics.wear.curves import THROUGH, Life, WearState, first_passed, local_bounds
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.record import Life, WearState
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 
 FIRST_GROWTH = 0.1

@@ -11,8 +11,7 @@ from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import LEVELS, Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
-from hpcclear.dynamics.evaluation.recorded.spectral import LEAST, Spectra
+from hpcclear.dynamics.evaluation.recorded.impacts import LEAST, Spectra, Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded, Recording, StepInstants
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
