@@ -7,27 +7,13 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from llvmlite import ir
 
-from hpcclear.base.lowering.values import (
-    DOUBLE,
-    TRUTH,
-    VECTOR,
-    WHOLE,
-    Array,
-    Value,
-    is_known,
-    rebuilt,
-    whole,
-    wider,
-)
+from hpcclear.base.lowering import values as val
+from hpcclear.base.lowering.values import DOUBLE, TRUTH, VECTOR, WHOLE, Array, Value
 
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 _BITS = {
-    ast.BitAnd: "and_",
-    ast.BitOr: "or_",
-    ast.BitXor: "xor",
-    ast.LShift: "shl",
-    ast.RShift: "ashr",
-}
+    ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor", ast.LShift: "shl", ast.RShift: "ashr"
+}  # fmt: skip
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _OPERATORS: dict[type[ast.AST], Callable[..., Value]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -51,13 +37,13 @@ class Arithmetic:
         if isinstance(known, bool | np.bool_):
             return ir.Constant(TRUTH, int(known))
         if isinstance(known, int | np.integer):
-            return whole(int(known))
+            return val.whole(int(known))
         if isinstance(known, float):
             return ir.Constant(DOUBLE, float(known))
         if isinstance(known, np.ndarray):
             return self.constant_array(known)
         if isinstance(known, tuple):
-            return rebuilt(type(known), map(self.value, known))
+            return val.rebuilt(type(known), map(self.value, known))
         return known
 
     def constant_array(self, known: np.ndarray) -> Array:
@@ -67,7 +53,10 @@ class Arithmetic:
         module = self.builder.module
         place = ir.GlobalVariable(module, content.type, module.get_unique_name("constant"))
         place.initializer, place.global_constant, place.linkage = content, True, "internal"
-        return Array(self.builder.gep(place, [whole(0), whole(0)]), tuple(map(whole, known.shape)))
+        return Array(
+            self.builder.gep(place, [val.whole(0), val.whole(0)]),
+            tuple(map(val.whole, known.shape)),
+        )
 
     def cast(self, value: Value, kind: ir.Type) -> Value:
         """A number as one of a type that holds it."""
@@ -75,13 +64,10 @@ class Arithmetic:
         if value.type == kind:
             return value
         if kind == VECTOR:
-            one = b.insert_element(
-                ir.Constant(VECTOR, ir.Undefined),
-                self.cast(value, DOUBLE),
-                ir.Constant(ir.IntType(32), 0),
-            )
+            nothing, first = ir.Constant(VECTOR, ir.Undefined), ir.Constant(ir.IntType(32), 0)
             mask = ir.Constant(ir.VectorType(ir.IntType(32), VECTOR.count), None)
-            return b.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), mask)
+            one = b.insert_element(nothing, self.cast(value, DOUBLE), first)
+            return b.shuffle_vector(one, nothing, mask)
         if kind == WHOLE:
             return b.zext(value, WHOLE)
         if isinstance(value, ir.Constant):
@@ -91,22 +77,22 @@ class Arithmetic:
     def both(self, one: Value, other: Value) -> tuple[Value, Value, ir.Type]:
         """Two numbers as of one type, and the type."""
         one, other = self.value(one), self.value(other)
-        kind = wider(one.type, other.type)
+        kind = val.wider(one.type, other.type)
         return self.cast(one, kind), self.cast(other, kind), kind
 
     def truth(self, value: Value) -> Value:
         """Whether a number is not zero."""
-        if is_known(value):
+        if val.is_known(value):
             return bool(value)
         if value.type == TRUTH:
             return value
         if value.type == WHOLE:
-            return self.builder.icmp_signed("!=", value, whole(0))
+            return self.builder.icmp_signed("!=", value, val.whole(0))
         return self.builder.fcmp_unordered("!=", value, ir.Constant(DOUBLE, 0.0))
 
     def binary(self, op: type[ast.operator], one: Value, other: Value) -> Value:
         """One number combined with another."""
-        if is_known((one, other)):
+        if val.is_known((one, other)):
             return _OPERATORS[op](one, other)
         b = self.builder
         one, other, kind = self.both(one, other)
@@ -123,16 +109,16 @@ class Arithmetic:
             return self.intrinsic("llvm.pow", [self.cast(one, DOUBLE), self.cast(other, DOUBLE)])
         assert kind == WHOLE, "// and % are of whole numbers"
         rest = b.srem(one, other)
-        signs = b.icmp_signed("<", b.xor(rest, other), whole(0))
-        less = b.and_(b.icmp_signed("!=", rest, whole(0)), signs)
+        signs = b.icmp_signed("<", b.xor(rest, other), val.whole(0))
+        less = b.and_(b.icmp_signed("!=", rest, val.whole(0)), signs)
         if op is ast.Mod:
-            return b.add(rest, b.select(less, other, whole(0)))
+            return b.add(rest, b.select(less, other, val.whole(0)))
         assert op is ast.FloorDiv
         return b.sub(b.sdiv(one, other), b.zext(less, WHOLE))
 
     def compared(self, op: type[ast.cmpop], one: Value, other: Value) -> Value:
         """Whether one number compares so with another."""
-        if is_known((one, other)) or op in (ast.Is, ast.IsNot):
+        if val.is_known((one, other)) or op in (ast.Is, ast.IsNot):
             return _OPERATORS[op](one, other)
         one, other, kind = self.both(one, other)
         if kind != DOUBLE:
@@ -171,13 +157,13 @@ class Arithmetic:
         return first
 
     def _call_abs(self, value: Value) -> Value:
-        negative = self.builder.icmp_signed("<", value, whole(0))
+        negative = self.builder.icmp_signed("<", value, val.whole(0))
         return self.builder.select(negative, self.builder.neg(value), value)
 
     def _call_int(self, value: Value) -> Value:
-        return (
-            self.builder.fptosi(value, WHOLE) if value.type == DOUBLE else self.cast(value, WHOLE)
-        )
+        if value.type == DOUBLE:
+            return self.builder.fptosi(value, WHOLE)
+        return self.cast(value, WHOLE)
 
     def _call_float(self, value: Value) -> Value:
         return self.cast(value, DOUBLE)
@@ -230,7 +216,7 @@ class Arithmetic:
 
     def _row(self, array: Array, row: Value) -> Value:
         """Address of a row of a flat array, as that of a vector."""
-        start = self.builder.mul(row, whole(VECTOR.count))
+        start = self.builder.mul(row, val.whole(VECTOR.count))
         return self.builder.bitcast(self.builder.gep(array.data, [start]), VECTOR.as_pointer())
 
     def _call_fetch(self, array: Array, row: Value) -> Value:
@@ -249,5 +235,5 @@ class Arithmetic:
 
     def _call_size(self, vector: Value) -> Value:
         bits = self.builder.bitcast(vector, ir.VectorType(WHOLE, VECTOR.count))
-        mask = ir.Constant(bits.type, [whole((1 << 63) - 1)] * VECTOR.count)
+        mask = ir.Constant(bits.type, [val.whole((1 << 63) - 1)] * VECTOR.count)
         return self.builder.bitcast(self.builder.and_(bits, mask), VECTOR)

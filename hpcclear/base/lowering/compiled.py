@@ -34,9 +34,8 @@ def interleaved(lanes: int) -> Iterator[None]:
     """
     option = "-force-vector-interleave={}"
     half = "+prefer-256-bit" in features_in_use()  # vectors take half of a register
-    llvm.set_option(
-        "", option.format(max(lanes // min(doubles_in_a_vector(), 4 if half else 8), 1))
-    )
+    vectors = max(lanes // min(doubles_in_a_vector(), 4 if half else 8), 1)
+    llvm.set_option("", option.format(vectors))
     try:
         yield
     finally:
@@ -69,9 +68,7 @@ class _Program:
 
         def call(other: Value, kinds: tuple[Kind, ...]) -> tuple[str, Kind]:
             options = other.targetoptions
-            fast = options.get(
-                "fastmath", flags
-            )  # as with Numba: of its caller where it says nothing
+            fast = options.get("fastmath", flags)  # as with Numba, its caller's if it has none
             key = other, kinds, frozenset(fast)
             if key not in self.known:
                 own = f"{self.name}.{other.__name__}.{len(self.known)}"
@@ -101,17 +98,13 @@ def _optimised(written: ir.Module, called: Sequence[llvm.ModuleRef]) -> llvm.Mod
 
     def builder(level: int, vectors: bool, unrolled: bool) -> llvm.PassBuilder:
         options = llvm.create_pipeline_tuning_options()
-        options.speed_level, options.loop_vectorization, options.loop_unrolling = (
-            level,
-            vectors,
-            unrolled,
-        )
+        options.speed_level = level
+        options.loop_vectorization, options.loop_unrolling = vectors, unrolled
         options.slp_vectorization = False
         return llvm.create_pass_builder(target, options)
 
-    first = builder(
-        3, True, False
-    )  # a loop over calls is short, and would be unrolled before they are inlined
+    # a loop over calls is short, and would be unrolled before they are inlined
+    first = builder(3, True, False)
     for function in module.functions:
         first.getFunctionPassManager().run(function, first)
     for one in called:
@@ -172,9 +165,8 @@ class Compiled:
             return bytes(_target().emit_object(module))
 
         code = kept.made(path, compiled)
-        engine = (
-            cpu_target.target_context.codegen()._engine._ee
-        )  # which keeps the machine code of this process
+        # which keeps the machine code of this process
+        engine = cpu_target.target_context.codegen()._engine._ee
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         self.address = int(engine.get_function_address(name))

@@ -11,25 +11,14 @@ from functools import reduce
 import numpy as np
 from llvmlite import ir
 
+from hpcclear.base.lowering import values as val
 from hpcclear.base.lowering.arithmetic import Arithmetic
-from hpcclear.base.lowering.values import (
-    DOUBLE,
-    WHOLE,
-    Array,
-    Value,
-    is_known,
-    rebuilt,
-    whole,
-    wider,
-)
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Array, Value
 from hpcclear.base.unrolled import written_out
 
 _INTRINSICS = {
-    math.sqrt: "llvm.sqrt",
-    np.sqrt: "llvm.sqrt",
-    math.copysign: "llvm.copysign",
-    abs: "llvm.fabs",
-}
+    math.sqrt: "llvm.sqrt", np.sqrt: "llvm.sqrt", math.copysign: "llvm.copysign", abs: "llvm.fabs"
+}  # fmt: skip
 _FOLDED = (len, int, float, min, max, abs, range, written_out)
 """What is called at once, if its arguments are known."""
 
@@ -77,9 +66,9 @@ class Expressions(Arithmetic):
         value = self.expression(node.operand)
         if isinstance(node.op, ast.Not):
             test = self.truth(value)
-            return not test if is_known(test) else self.builder.not_(test)
+            return not test if val.is_known(test) else self.builder.not_(test)
         assert isinstance(node.op, ast.USub)
-        if is_known(value):
+        if val.is_known(value):
             return -value
         if value.type == WHOLE:
             return self.builder.neg(value)
@@ -116,7 +105,7 @@ class Expressions(Arithmetic):
 
     def either(self, test: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """The value of one of two branches; of the one that is taken, where that is known."""
-        if is_known(test):
+        if val.is_known(test):
             return yes() if test else no()
         b, ends = self.builder, []
         blocks = [b.append_basic_block() for _ in range(2)]
@@ -157,8 +146,8 @@ class Expressions(Arithmetic):
             return lambda chosen: first
         if isinstance(first, tuple):
             parts = [self._cast(one, blocks, cast) for one in zip(*values, strict=True)]
-            return lambda chosen: rebuilt(type(first), [part(chosen) for part in parts])
-        kind = reduce(wider, [self.value(value).type for value in values])
+            return lambda chosen: val.rebuilt(type(first), [part(chosen) for part in parts])
+        kind = reduce(val.wider, [self.value(value).type for value in values])
         for value, block, column in zip(values, blocks, cast, strict=True):
             self.builder.position_at_end(block)
             column.append(self.cast(value, kind))
@@ -170,7 +159,7 @@ class Expressions(Arithmetic):
             low, high = (self.value(self.expression(end)) for end in (index.lower, index.upper))  # type: ignore[arg-type]
             return Array(self.builder.gep(owner.data, [low]), (self.builder.sub(high, low),))
         known = self.expression(index)
-        if is_known((known, owner)):
+        if val.is_known((known, owner)):
             found = owner[known]
             return found.item() if isinstance(found, np.generic) else found
         return self.item(owner, list(known) if isinstance(known, tuple) else [known])
@@ -185,13 +174,12 @@ class Expressions(Arithmetic):
         if not isinstance(owner, tuple):  # a place in memory
             return self.builder.load(self.builder.gep(owner, list(map(self.value, index))))
         (one,) = index
-        if is_known(one):
+        if val.is_known(one):
             return owner[one]
         chosen, *others = map(self.value, owner)
         for k, other in enumerate(others, 1):
-            chosen = self.builder.select(
-                self.builder.icmp_signed("==", one, whole(k)), other, chosen
-            )
+            here = self.builder.icmp_signed("==", one, val.whole(k))
+            chosen = self.builder.select(here, other, chosen)
         return chosen
 
     def _of_Call(self, node: ast.Call) -> Value:
@@ -200,13 +188,12 @@ class Expressions(Arithmetic):
         named = {str(one.arg): self.expression(one.value) for one in node.keywords}
         if function is getattr or (isinstance(function, type) and issubclass(function, tuple)):
             return function(*arguments, **named)
-        if function in _FOLDED and all(map(is_known, arguments)):
+        if function in _FOLDED and all(map(val.is_known, arguments)):
             return function(*arguments)
         if hasattr(function, "py_func"):
             return self.called(function, arguments, named)
         arguments = list(map(self.value, arguments))
         if function in _INTRINSICS and arguments[0].type != WHOLE:
-            return self.intrinsic(
-                _INTRINSICS[function], [self.cast(one, DOUBLE) for one in arguments]
-            )
+            doubles = [self.cast(one, DOUBLE) for one in arguments]
+            return self.intrinsic(_INTRINSICS[function], doubles)
         return getattr(self, f"_call_{function.__name__}")(*arguments)

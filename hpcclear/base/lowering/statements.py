@@ -14,22 +14,9 @@ from functools import cache
 import numpy as np
 from llvmlite import ir
 
+from hpcclear.base.lowering import values as val
 from hpcclear.base.lowering.expressions import Expressions
-from hpcclear.base.lowering.values import (
-    DOUBLE,
-    WHOLE,
-    Array,
-    Flags,
-    Kind,
-    Value,
-    flat,
-    gathered,
-    is_known,
-    kind_of,
-    types_of,
-    wider,
-    wider_kind,
-)  # fmt: skip
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Array, Flags, Kind, Value
 
 
 @cache
@@ -96,7 +83,7 @@ class Function(Expressions):
         self.frame, self.calls = _Frame(self.lowers, 0), 0
         passed = iter(self.function.args)
         names = [one.arg for one in self.frame.node.args.args]
-        values = [gathered(kind, passed) for kind in self.kinds]
+        values = [val.gathered(kind, passed) for kind in self.kinds]
         try:
             self.enter(dict(zip(names, values, strict=True)))
             if not self.ended():
@@ -120,13 +107,13 @@ class Function(Expressions):
     def bind(self, name: str, value: Value) -> None:
         """Let a local have a value; a number that another may follow gets a place in memory."""
         here = self.frame
-        known = is_known(value) and here.assigned[name] <= 1
+        known = val.is_known(value) and here.assigned[name] <= 1
         if known or not _is_number(value):
             here.slots.pop(name, None)
             here.bound[name] = value
             return
         value, key = self.value(value), (here.number, name)
-        kind = wider(self.types.get(key), value.type)
+        kind = val.wider(self.types.get(key), value.type)
         if kind != self.types.setdefault(key, kind):
             self.types[key] = kind
             raise _Wider
@@ -172,14 +159,14 @@ class Function(Expressions):
     def beside(self, function: Value, arguments: list[Value]) -> Value:
         """What a function of its own returns."""
         arguments = [self.value(a) if isinstance(a, np.ndarray) else a for a in arguments]
-        kinds = tuple(kind_of(one, known=True) for one in arguments)
+        kinds = tuple(val.kind_of(one, known=True) for one in arguments)
         name, result = self._call(function, kinds)
         callee = self.module.globals.get(name) or declared(self.module, name, kinds, result)
-        given = [one for one in flat(tuple(arguments)) if isinstance(one, ir.Value)]
+        given = [one for one in val.flat(tuple(arguments)) if isinstance(one, ir.Value)]
         found = self.builder.call(callee, given)
         if isinstance(found.type, ir.LiteralStructType):
             parts = [self.builder.extract_value(found, k) for k in range(len(found.type.elements))]
-            return gathered(result, iter(parts))
+            return val.gathered(result, iter(parts))
         return None if result.of is None else found
 
     # ---- statements -----------------------------------------------------------------------------
@@ -230,11 +217,9 @@ class Function(Expressions):
     def address(self, owner: Value, index: Value) -> Value:
         """Where an entry of an array stands."""
         places = list(map(self.value, index if isinstance(index, tuple) else [index]))
-        return (
-            self.place(owner, places)
-            if isinstance(owner, Array)
-            else self.builder.gep(owner, places)
-        )
+        if isinstance(owner, Array):
+            return self.place(owner, places)
+        return self.builder.gep(owner, places)
 
     def store(self, value: Value, place: Value) -> None:
         """Put a number into memory."""
@@ -257,7 +242,7 @@ class Function(Expressions):
 
     def _do_If(self, node: ast.If) -> None:
         test = self.truth(self.expression(node.test))
-        if is_known(test):
+        if val.is_known(test):
             self.several(node.body if test else node.orelse)
             return
         b = self.builder
@@ -300,7 +285,7 @@ class Function(Expressions):
     def _do_For(self, node: ast.For) -> None:
         ranges = isinstance(node.iter, ast.Call) and self.expression(node.iter.func) is range
         bounds = list(map(self.expression, node.iter.args)) if ranges else []  # type: ignore[attr-defined]
-        few = is_known(tuple(bounds)) and len(range(*bounds)) <= 1 if ranges else True
+        few = val.is_known(tuple(bounds)) and len(range(*bounds)) <= 1 if ranges else True
         leaves = any(isinstance(n, ast.Break) for s in node.body for n in ast.walk(s))
         if few and not (ranges and leaves):
             for item in range(*bounds) if ranges else self.expression(node.iter):
@@ -309,7 +294,7 @@ class Function(Expressions):
             return
         b = self.builder
         start, stop, step = (*(bounds if len(bounds) > 1 else (0, *bounds)), 1)[:3]
-        down = is_known(step) and step < 0  # a step that comes at run time leads upward
+        down = val.is_known(step) and step < 0  # a step that comes at run time leads upward
         counter = ir.IRBuilder(self.first).alloca(WHOLE)
         b.store(self.value(start), counter)
         test, body, last = (b.append_basic_block() for _ in range(3))
@@ -330,7 +315,7 @@ class Function(Expressions):
         if isinstance(target, ast.Tuple):
             for part, one in zip(target.elts, item, strict=True):
                 self.settle(part, one)
-        elif isinstance(target, ast.Name) and is_known(item):
+        elif isinstance(target, ast.Name) and val.is_known(item):
             self.frame.slots.pop(target.id, None)
             self.frame.bound[target.id] = item
         else:
@@ -347,16 +332,14 @@ class Function(Expressions):
         """Leave the function with a value."""
         value = self.value(value)
         if isinstance(value, ir.Value):  # a bit alone has no place in what a caller is given
-            value = self.cast(value, wider(WHOLE, value.type))
-        kind = kind_of(value)
-        wanted = kind if self.result.of is None else wider_kind(self.result, kind)
+            value = self.cast(value, val.wider(WHOLE, value.type))
+        kind = val.kind_of(value)
+        wanted = kind if self.result.of is None else val.wider_kind(self.result, kind)
         if wanted != self.result:
             self.result = wanted
             raise _Wider
-        values = [
-            self.cast(one, one_kind)
-            for one, one_kind in zip(flat(value), types_of(wanted), strict=True)
-        ]
+        pairs = zip(val.flat(value), val.types_of(wanted), strict=True)
+        values = [self.cast(one, one_kind) for one, one_kind in pairs]
         if value is None:
             self.builder.ret_void()
         elif not isinstance(value, tuple):
@@ -388,12 +371,8 @@ def _allow(one: ir.Instruction, flags: tuple[str, ...]) -> None:
 
 def declared(module: ir.Module, name: str, kinds: Sequence[Kind], result: Kind) -> ir.Function:
     """A function by its arguments and its result: nothing, a number, or a structure of a tuple's numbers."""
-    returned = list(types_of(result))
-    kind = (
-        ir.LiteralStructType(returned)
-        if isinstance(result.of, type)
-        else (*returned, ir.VoidType())[0]
-    )
-    return ir.Function(
-        module, ir.FunctionType(kind, [one for kind in kinds for one in types_of(kind)]), name
-    )
+    returned = list(val.types_of(result))
+    several = isinstance(result.of, type)
+    kind = ir.LiteralStructType(returned) if several else (*returned, ir.VoidType())[0]
+    passed = [one for kind in kinds for one in val.types_of(kind)]
+    return ir.Function(module, ir.FunctionType(kind, passed), name)

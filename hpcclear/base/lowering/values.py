@@ -51,9 +51,9 @@ DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())
 
 def is_known(value: Value) -> bool:
     """Whether a value is Python's, and not LLVM's or a tuple with some of LLVM's."""
-    return (
-        all(map(is_known, value)) if isinstance(value, tuple) else not isinstance(value, ir.Value)
-    )
+    if isinstance(value, tuple):
+        return all(map(is_known, value))
+    return not isinstance(value, ir.Value)
 
 
 def kind_of(value: Value, known: bool = False) -> Kind:
@@ -106,9 +106,9 @@ def gathered(kind: Kind, parts: Iterator[Value]) -> Value:
         return next(parts)
     if kind.of == "known":
         return kind.parts[1]
-    return (
-        None if kind.of is None else rebuilt(kind.of, [gathered(one, parts) for one in kind.parts])
-    )
+    if kind.of is None:
+        return None
+    return rebuilt(kind.of, [gathered(one, parts) for one in kind.parts])
 
 
 def rebuilt(maker: Callable[..., Value], items: Iterable[Value]) -> Value:
@@ -120,6 +120,6 @@ def wider_kind(one: Kind, other: Kind) -> Kind:
     """The kind that holds values of two kinds that differ in types of numbers at most."""
     if isinstance(one.of, ir.Type):
         return Kind(wider(one.of, other.of))
-    return (
-        one if one.of == "array" else Kind(one.of, tuple(map(wider_kind, one.parts, other.parts)))
-    )
+    if one.of == "array":
+        return one
+    return Kind(one.of, tuple(map(wider_kind, one.parts, other.parts)))
