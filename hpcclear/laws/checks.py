@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.laws.declared import (
-    JOINT,
-    LAW_NUMBERS,
-    VARYING,
-    ContactLaw,
-    FrictionLaw,
-    Function,
-    Law,
-    Parameter,
-)
+from hpcclear.laws import declared
+from hpcclear.laws.declared import ContactLaw, FrictionLaw, Function, Law, Parameter
 from hpcclear.laws.numbers import elastic_at, evaluate, force_of, sample_numbers, stored, with_words
 from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import text_of
@@ -26,16 +18,7 @@ from hpcclear.laws.translate import LawError
 
 MOST_PARAMETERS = 32
 
-TYPICAL = {
-    "stiffness": 9e8,
-    "compliance": 1.7e-9,
-    "bearing_radius": 0.02,
-    "journal_radius": 0.0197,
-    "clearance": 3e-4,
-    "length": 0.02,
-    "dundurs_alpha": 0.0,
-    "dundurs_beta": 0.0,
-}
+TYPICAL = dict(zip(declared.JOINT, (9e8, 1.7e-9, 0.02, 0.0197, 3e-4, 0.02, 0.0, 0.0), strict=True))
 """A joint of the paper's: what laws are tried on."""
 
 DEPTHS = np.logspace(-9, -3.5, 45)
@@ -54,28 +37,28 @@ SAME = 1e-4
 
 
 _PAIRS = {
-    "contact": (
-        ("factor", "elastic", "factor multiplies the elastic part of the force"),
-    ),
+    "contact": ("factor", "elastic", "factor multiplies the elastic part of the force"),
     "friction": (
-        ("deflection", "largest", "the largest deflection, m, sets the tolerance of bristles"),
+        "deflection",
+        "largest",
+        "the largest deflection, m, sets the tolerance of bristles",
     ),
-}  # fmt: skip
+}
 """What a law declares, what belongs to it, and why."""
 
 
 def _check_declared(law: Law) -> None:
-    for own, other, why in _PAIRS[law.kind]:
-        if getattr(law, own) and not getattr(law, other):
-            geometry = ", or name a geometry in the scene" if other == "elastic" else ""
-            raise LawError(f"declares {own} without {other}: {why}", f"Declare {other}{geometry}")
+    own, other, why = _PAIRS[law.kind]
+    if getattr(law, own) and not getattr(law, other):
+        geometry = ", or name a geometry in the scene" if other == "elastic" else ""
+        raise LawError(f"declares {own} without {other}: {why}", f"Declare {other}{geometry}")
     main = "force" if law.kind == "contact" else "ratio"
     plain = next(one.default for one in fields(law) if one.name == main)
-    declared = getattr(law, main) is not plain
-    if not declared and getattr(law, "factor", None) is None:
+    own_main = getattr(law, main) is not plain
+    if not own_main and getattr(law, "factor", None) is None:
         other = " (or factor and elastic)" if law.kind == "contact" else ""
         raise LawError(f"declares no {main}", f"Declare {main}{other}")
-    if declared and getattr(law, "factor", None) is not None:
+    if own_main and getattr(law, "factor", None) is not None:
         raise LawError("declares both force and factor", "Declare force, or factor and elastic")
     if len(getattr(law, "kinks", ())) not in (0, 2):
         raise LawError(f"declares {len(law.kinks)} kinks", "Declare two, or none")  # type: ignore[attr-defined]
@@ -109,8 +92,8 @@ def check_shape(law: Law) -> None:
     """LawError unless the law's functions require known quantities, are arithmetic, and fit their rows."""
     _check_declared(law)
     own = {one.name for one in law.parameters}
-    given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
-    for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
+    given = own | declared.JOINT.keys() | law.numbers.keys() | declared.VARYING[law.kind].keys()
+    for name in own & (declared.JOINT.keys() | declared.VARYING[law.kind].keys()):
         reason = f"has a parameter {name!r}, a name reserved for numbers of the joint"
         raise LawError(reason, "Give it another name")
     functions = {**law.functions(), **{f.__name__: f for f in law.afterwards()}}
@@ -121,13 +104,11 @@ def check_shape(law: Law) -> None:
                     f"{title} uses {name!r}, which is not defined",
                     f"Declare it as a parameter, or in numbers. Known are {', '.join(sorted(given))}",
                 )
-    if len(law.read) > LAW_NUMBERS:
-        reason = f"reads {len(law.read)} numbers, more than {LAW_NUMBERS}"
+    if len(law.read) > declared.LAW_NUMBERS:
+        reason = f"reads {len(law.read)} numbers, more than {declared.LAW_NUMBERS}"
         raise LawError(reason, "Compute more of them in once")
     if isinstance(law, ContactLaw) and law.elastic is not None:
-        for name in {"rate", "impact_speed", "inverse_impact_speed"} & {
-            *law.arguments(law.elastic)
-        }:
+        for name in declared.VARYING["contact"].keys() - {"depth"} & {*law.arguments(law.elastic)}:
             raise LawError(f"elastic uses {name!r}, but stored energy depends on the depth alone")
     text_of(law)
 
@@ -172,8 +153,8 @@ def check_units(law: Law, values: Mapping[str, object]) -> None:
 def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Quantity]:
     """What a law's functions may require, with units."""
     made = registry().Quantity
-    given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
-    given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
+    given = {name: made(TYPICAL[name], unit) for name, unit in declared.JOINT.items()}
+    given |= {name: made(0.1, unit) for name, unit in declared.VARYING[law.kind].items()}
     given["depth"] = made(1e-5, "m")
     for one in law.parameters:
         value, unit = values[one.name], unit_of(one.unit, one.name)
@@ -225,12 +206,8 @@ def check_numbers(law: Law, values: Mapping[str, object]) -> None:
 
 def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
     depth, rate, impact = DEPTHS[:, None, None], RATES[None, :, None], IMPACT_SPEEDS[None, None]
-    varying = {
-        "depth": depth,
-        "rate": rate,
-        "impact_speed": impact,
-        "inverse_impact_speed": 1.0 / impact,
-    }
+    quantities = (depth, rate, impact, 1.0 / impact)
+    varying = dict(zip(declared.VARYING["contact"], quantities, strict=True))
     shape = (len(DEPTHS), len(RATES), len(IMPACT_SPEEDS))
     force = np.broadcast_to(force_of(law, {**given, **varying}), shape)
 
@@ -291,12 +268,8 @@ def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) 
 
 
 def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
-    varying = {
-        "speed": SPEEDS,
-        "force": np.ones_like(SPEEDS),
-        "deflection": 0.0 * SPEEDS,
-        "deflection_rate": 0.0 * SPEEDS,
-    }
+    quantities = (SPEEDS, np.ones_like(SPEEDS), 0.0 * SPEEDS, 0.0 * SPEEDS)
+    varying = dict(zip(declared.VARYING["friction"], quantities, strict=True))
     ratio = np.broadcast_to(evaluate(law.ratio, {**given, **varying}), SPEEDS.shape)
     bad = ~np.isfinite(ratio)
     if bad.any():

@@ -7,6 +7,7 @@ writes into its formula thus come to the same machine code.
 
 import ast
 import inspect
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from types import FunctionType
@@ -54,11 +55,7 @@ class _Parts(ast.NodeTransformer):
         self.own, self.title, self.known, self.constants = own, title, known, dict[str, str]()
         self.tree = definition_of(own)
         self.arguments = [one.arg for one in self.tree.args.args]
-        self.stored = [
-            one.id
-            for one in ast.walk(self.tree)
-            if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
-        ]
+        self.stored = [one.id for one in _words(self.tree) if isinstance(one.ctx, ast.Store)]
         self.fixed = {*self.arguments} - VARYING[kind].keys() - {*self.stored}
         self.locals = dict[str, ast.expr]()
         divisions = _count(self.tree)
@@ -78,7 +75,7 @@ class _Parts(ast.NodeTransformer):
         return False
 
     def _constant(self, node: ast.AST) -> bool:
-        names = {one.id for one in ast.walk(node) if isinstance(one, ast.Name)}
+        names = {one.id for one in _words(node)}
         varying = {*self.arguments, *self.stored} - self.fixed
         return bool(names & self.fixed) and not names & varying
 
@@ -103,7 +100,7 @@ class _Parts(ast.NodeTransformer):
         return ast.BinOp(self.visit(left), ast.Mult(), inverse)
 
     def _number(self, text: str) -> ast.Name:
-        words = {one.id for one in ast.walk(ast.parse(text)) if isinstance(one, ast.Name)}
+        words = {one.id for one in _words(ast.parse(text))}
         where = 0 if words <= self.fixed else id(self.own.__globals__)
         name = self.known.setdefault((text, where), f"once_{len(self.known)}")
         self.constants[text] = name
@@ -118,21 +115,20 @@ class _Parts(ast.NodeTransformer):
 
     def function(self) -> Function:
         body = "\n".join(ast.unparse(ast.fix_missing_locations(one)) for one in self.tree.body)
-        used = {one.id for one in ast.walk(ast.parse(body)) if isinstance(one, ast.Name)}
+        used = {one.id for one in _words(ast.parse(body))}
         names = dict.fromkeys([*self.arguments, INVERSE, *self.constants.values()])
         indented = "".join(f"    {line}\n" for line in body.splitlines())
         return self._made(self.title, [one for one in names if one in used], indented)
 
     def once(self) -> Function:
-        used = {
-            one.id
-            for text in self.constants
-            for one in ast.walk(ast.parse(text))
-            if isinstance(one, ast.Name)
-        }
+        used = {one.id for text in self.constants for one in _words(ast.parse(text))}
         items = ", ".join(f"{name!r}: {text}" for text, name in self.constants.items())
         names = [one for one in self.arguments if one in used]
         return self._made(f"once_{self.title}", names, f"    return {{{items}}}")
+
+
+def _words(tree: ast.AST) -> Iterator[ast.Name]:
+    return (one for one in ast.walk(tree) if isinstance(one, ast.Name))
 
 
 def _count(tree: ast.AST) -> int:
@@ -153,7 +149,7 @@ class _Short(ast.NodeTransformer):
             own = [one.arg for one in tree.args.args]
             match [one for one in tree.body if not isinstance(one, ast.Expr)]:
                 case [ast.Return(value=ast.expr() as value)] if len(own) == len(node.args):
-                    free = {one.id for one in ast.walk(value) if isinstance(one, ast.Name)} - {*own}
+                    free = {one.id for one in _words(value)} - {*own}
                     if all(self.around.get(k) is called.__globals__.get(k) for k in free):
                         given = dict(zip(own, node.args, strict=True))
                         return _Named(given).visit(value)

@@ -61,13 +61,9 @@ class Parameter:
 
     def bounds(self) -> str:
         """The bounds in words."""
-        limits = {
-            "above": self.above,
-            "at least": self.least,
-            "below": self.below,
-            "at most": self.most,
-        }
-        return " and ".join(f"{word} {one:g}" for word, one in limits.items() if one is not None)
+        words = ("above", "at least", "below", "at most")
+        limits = zip(words, (self.above, self.least, self.below, self.most), strict=True)
+        return " and ".join(f"{word} {one:g}" for word, one in limits if one is not None)
 
     @property
     def title(self) -> str:

@@ -55,14 +55,10 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     names = list(dict.fromkeys(used))
     text = f"from math import *\n\n\ndef {entry}({', '.join(names)}):\n    return {ast.unparse(tree)}\n"
     function = function_of(text, entry)
-    named: dict[str, Any] = {
-        "name": "expression",
-        "words": "a formula in the scene",
-        "formula": formula,
-    }
-    if kind == "contact":
-        return ContactLaw(**named, parameters=parameters, force=function)
-    return FrictionLaw(**named, parameters=parameters, ratio=function)
+    maker: Any = ContactLaw if kind == "contact" else FrictionLaw
+    named = {"name": "expression", "words": "a formula in the scene", entry: function}
+    made: Law = maker(formula=formula, parameters=parameters, **named)
+    return made
 
 
 def _check_si(name: str, unit: str) -> None:

@@ -43,13 +43,8 @@ def with_words(
             made[name] = words[name]
         elif isinstance(value, FunctionType) and value is not function:
             made[name] = with_words(value, words, own)
-    result = FunctionType(
-        code,
-        {**names, **own, **made},
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
+    around, defaults = {**names, **own, **made}, function.__defaults__
+    result = FunctionType(code, around, function.__name__, defaults, function.__closure__)
     result.__kwdefaults__ = function.__kwdefaults__
     return result
 
@@ -100,9 +95,8 @@ def _with_numpy(function: Function) -> Function:
     code = function.__code__
     constants = tuple(np.float64(one) if type(one) is float else one for one in code.co_consts)
     changed = code.replace(co_consts=constants)
-    return FunctionType(
-        changed, function.__globals__, function.__name__, None, function.__closure__
-    )
+    around = function.__globals__
+    return FunctionType(changed, around, function.__name__, None, function.__closure__)
 
 
 def _is_complex(found: object) -> bool:
@@ -209,11 +203,8 @@ def steepness_of(law: FrictionLaw, numbers: Mapping[str, Any], size: int) -> tup
     if law.bristled:  # which hold at any speed
         return np.zeros(size), np.zeros(size)
     speeds = np.concatenate([[0.0], np.logspace(-9, 2, 2200)])
-    columns = {
-        name: np.asarray(one, float).reshape(-1, 1)
-        for name, one in numbers.items()
-        if np.ndim(one) < 2
-    }
+    flat = [(name, np.asarray(one, float)) for name, one in numbers.items() if np.ndim(one) < 2]
+    columns = {name: one.reshape(-1, 1) for name, one in flat}
     ratio = evaluate(law.ratio, {**columns, "speed": speeds[None], "force": np.ones((1, 1))})
     ratio = np.broadcast_to(ratio, (size, len(speeds)))
     slope = np.abs(np.diff(ratio) / np.diff(speeds)).max(axis=1)

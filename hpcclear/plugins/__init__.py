@@ -11,19 +11,9 @@ from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import raised, run_source, trusting, using
 
 __all__ = [
-    "CONTACT_LAWS",
-    "DISTRIBUTIONS",
-    "FRICTION_LAWS",
-    "KINDS",
-    "OBJECTIVES",
-    "SEARCHES",
-    "SURROGATES",
-    "Registry",
-    "raised",
-    "run_source",
-    "trusting",
-    "using",
-]
+    "CONTACT_LAWS", "DISTRIBUTIONS", "FRICTION_LAWS", "KINDS", "OBJECTIVES", "SEARCHES", "SURROGATES", "Registry", "raised",
+    "run_source", "trusting", "using",
+]  # fmt: skip
 
 CONTACT_LAWS = Registry[object]("contact law", "hpcclear.contact_laws")
 FRICTION_LAWS = Registry[object]("friction law", "hpcclear.friction_laws")
