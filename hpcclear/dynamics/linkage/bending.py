@@ -13,7 +13,8 @@ The axial force is in it: of inertia by G and B, of what pulls at b by delta. Wh
 inertia leave beside the uniform bar (`uniform_share`) is rigid: big ends, bosses.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -75,21 +76,24 @@ class Bend:
             return ZERO
         return self._number(f"{entry}_{min(i, j)}{max(i, j)}")
 
+    def _sum(
+        self, factor: Callable[[int], Term], others: Sequence[Term], start: Term = ZERO
+    ) -> Term:
+        """Factors by mode times amplitudes or velocities, added to a term."""
+        both = zip(self.modes, others, strict=True)
+        return sum((factor(mode) * other for mode, other in both), start)
+
     def _times(self, entry: str, mode: int) -> Term:
         """Row of G ("axial") or B ("spun") times the amplitudes."""
-        places = zip(self.modes, self.q, strict=True)
-        total = sum((self._pair(entry, mode, k) * amplitude for k, amplitude in places), ZERO)
-        return self._let(f"{entry}{mode}", total)
+        return self._let(f"{entry}{mode}", self._sum(lambda k: self._pair(entry, mode, k), self.q))
 
-    def _dotted(self, entry: str, others: tuple[Term, ...]) -> Term:
-        both = zip(self.modes, others, strict=True)
-        return sum((self._times(entry, mode) * other for mode, other in both), ZERO)
+    def _dotted(self, entry: str, others: Sequence[Term]) -> Term:
+        return self._sum(lambda mode: self._times(entry, mode), others)
 
     # ---- places -------------------------------------------------------------------------------------
     def shortening(self) -> Term:
         """delta, m."""
-        places = zip(self.modes, self.q, strict=True)
-        total = sum((self._number(f"nearer_{k}") * q * q for k, q in places), ZERO)
+        total = self._sum(lambda k: self._number(f"nearer_{k}") * self.q[k - 1], self.q)
         return self._let("shorter", _HALF * total)
 
     def nearer(self, mode: int) -> tuple[Term, Term]:
@@ -104,20 +108,15 @@ class Bend:
 
     def end_spin(self, spin: Term, point: str) -> Term:
         """Angular velocity of the end at a point."""
-        places = zip(self.modes, self.v, strict=True)
-        turned = sum((self.slope(mode, point) * speed for mode, speed in places), spin)
+        turned = self._sum(lambda mode: self.slope(mode, point), self.v, spin)
         return self._let(f"spin_{point}", turned)
 
     # ---- inertia ------------------------------------------------------------------------------------
     def moved(self) -> Vector:
         """D, kg m."""
-        across = self._sideways(self.q)
+        across = self._sum(self.lateral, self.q)
         along = -(_HALF * self._dotted("axial", self.q))
         return Vector(self._let("along", along), self._let("across", across))
-
-    def _sideways(self, others: tuple[Term, ...]) -> Term:
-        both = zip(self.modes, others, strict=True)
-        return sum((self.lateral(mode) * other for mode, other in both), ZERO)
 
     def moved_by(self, mode: int) -> Vector:
         """Derivative of D by an amplitude."""
@@ -125,14 +124,13 @@ class Bend:
 
     def moving(self) -> Vector:
         """Rate of D while the bar does not turn."""
-        across = self._let("vacross", -self._sideways(self.v))
+        across = self._let("vacross", -self._sum(self.lateral, self.v))
         return Vector(across, self._let("valong", -self._dotted("axial", self.v)))
 
     def gathering(self) -> Term:
         """Second derivative of D along the bar while no amplitude accelerates."""
-        total, speeds = ZERO, [*zip(self.modes, self.v, strict=True)]
-        for i, one in speeds:
-            total = total + sum((self._pair("axial", i, j) * two for j, two in speeds), ZERO) * one
+        rows = partial(self._pair, "axial")
+        total = self._sum(lambda i: self._sum(partial(rows, i), self.v), self.v)
         return self._let("gathering", -total)
 
     def spun(self) -> Term:
@@ -154,18 +152,13 @@ class Bend:
 
     def restoring(self, mode: int, spin: Term) -> Term:
         """Force on an amplitude: what turning throws outwards, less spring and damper."""
-        thrown = self._times("spun", mode) * spin * spin
-        return (
-            thrown
-            - self._beyond()
-            - self._number(f"stiffness_{mode}") * self.q[mode - 1]
-            - self._number(f"damping_{mode}") * self.v[mode - 1]
-        )
+        thrown = self._times("spun", mode) * spin * spin - self._beyond()
+        spring = self._number(f"stiffness_{mode}") * self.q[mode - 1]
+        return thrown - spring - self._number(f"damping_{mode}") * self.v[mode - 1]
 
     def loss(self) -> Term:
         """Power that damping takes, W."""
-        places = zip(self.modes, self.v, strict=True)
-        return sum((self._number(f"damping_{k}") * speed * speed for k, speed in places), ZERO)
+        return self._sum(lambda k: self._number(f"damping_{k}") * self.v[k - 1], self.v)
 
 
 # ---- numbers --------------------------------------------------------------------------------------------
@@ -176,13 +169,9 @@ def entries(modes: int) -> tuple[str, ...]:
     rows = range(1, modes + 1)
     single = ("lateral", "turned", "nearer", "slope", "stiffness", "damping")
     pairs = [f"{i}{j}" for i in rows for j in rows if i <= j]
-    return (
-        "mass",
-        "inverse_mass",
-        "most",
-        *(f"{entry}_{i}" for entry in single for i in rows),
-        *(f"{entry}_{pair}" for entry in ("axial", "spun") for pair in pairs),
-    )
+    by_mode = (f"{entry}_{i}" for entry in single for i in rows)
+    by_pair = (f"{entry}_{pair}" for entry in ("axial", "spun") for pair in pairs)
+    return ("mass", "inverse_mass", "most", *by_mode, *by_pair)
 
 
 def uniform_share(mass: Number, inertia: Number, length: Number, center: Number) -> Number:
@@ -211,10 +200,8 @@ class Bar(NamedTuple):
 def bar_of(body: Body) -> Bar:
     """The bar that a body with bending is."""
     assert body.bending is not None
-    length, center = body.points["b"][0], body.center[0]
-    return Bar(
-        body.mass, body.inertia, length, center, body.bending.stiffness, body.bending.damping
-    )
+    length, center, bending = body.points["b"][0], body.center[0], body.bending
+    return Bar(body.mass, body.inertia, length, center, bending.stiffness, bending.damping)
 
 
 def numbers(bar: Bar, modes: int) -> dict[str, Number]:

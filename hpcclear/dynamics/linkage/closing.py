@@ -8,18 +8,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
+from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Drive,
-    Joint,
-    TableRow,
-    is_joint,
-    is_pin,
-    places_of,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, Drive, Joint, TableRow
 
 
 class ClosureRow(NamedTuple):
@@ -46,9 +38,9 @@ class Closing:
 
     def rows(self, one: TableRow) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
-        if is_pin(one):
+        if parts.is_pin(one):
             return self._pin(one)
-        if is_joint(one):
+        if parts.is_joint(one):
             assert one.kind != "fixed"
             return self._guide(one)[: one.holds]
         return [self._driven(one)]
@@ -75,9 +67,9 @@ class Closing:
         kin = self.kinematics
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
         error = kin.position(journal) - kin.position(bearing)
-        rate = self.rate(*places_of(joint))
+        rate = self.rate(*parts.places_of(joint))
         rest = self.unforced(journal) - self.unforced(bearing)
-        columns = self.between(*places_of(joint))
+        columns = self.between(*parts.places_of(joint))
         return [
             self._row(
                 f"{joint.name}_{axis}", {c: getattr(v, axis) for c, v in columns.items()},
@@ -119,16 +111,16 @@ class Closing:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
-        body, carrier = (split(place)[0] for place in places_of(joint))
+        body, carrier = (parts.split(place)[0] for place in parts.places_of(joint))
         own, other = forest.frames[body], forest.frames[carrier]
         along = self.direction(joint)
         normal = along.across()
         point, line = kin.point(joint.point), kin.point(joint.line)
         apart = kin.position(point) - kin.position(line)
-        rate = self.rate(*places_of(joint))
+        rate = self.rate(*parts.places_of(joint))
         rest = self.unforced(point) - self.unforced(line)
         spin = kin.spin(other)
-        columns = {c: dot(v, normal) for c, v in self.between(*places_of(joint)).items()}
+        columns = {c: dot(v, normal) for c, v in self.between(*parts.places_of(joint)).items()}
         if other != GROUND:
             apart = Vector(*(write.let(f"apart_{joint.name}", part) for part in apart))
             turns = Mover("angle", other)
@@ -152,21 +144,21 @@ class Closing:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
         kin, along = self.kinematics, self.direction(joint)
         normal = along.across()
-        point, line = (kin.position(kin.point(place)) for place in places_of(joint))
+        point, line = (kin.position(kin.point(place)) for place in parts.places_of(joint))
         aside = self.writer.let(f"aside_{joint.name}", dot(point - line, normal))
-        moved = {c: dot(v, along) for c, v in self.between(*places_of(joint)).items()}
-        carrier = kin.forest.frames[split(joint.line)[0]]
+        moved = {c: dot(v, along) for c, v in self.between(*parts.places_of(joint)).items()}
+        carrier = kin.forest.frames[parts.split(joint.line)[0]]
         if carrier != GROUND:
             turns = Mover("angle", carrier)
             moved[turns] = moved.get(turns, ZERO) + aside
-        speed = dot(self.rate(*places_of(joint)), along) + kin.spin(carrier) * aside
+        speed = dot(self.rate(*parts.places_of(joint)), along) + kin.spin(carrier) * aside
         return {c: term for c, term in moved.items() if term}, self.writer.let(
             f"v_{joint.name}", speed
         )
 
     def direction(self, joint: Joint) -> Vector:
         """Unit vector of a guide's line, along the ground's axes."""
-        carrier = split(joint.line)[0]
+        carrier = parts.split(joint.line)[0]
         forest, write = self.kinematics.forest, self.writer
         held = Vector(ONE, ZERO)
         if forest.offsets[carrier] + joint.angle != 0.0:

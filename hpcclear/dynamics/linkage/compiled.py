@@ -9,7 +9,7 @@ from hpcclear.base.generated import module_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout import curves
 from hpcclear.dynamics.linkage.elements import functions
-from hpcclear.dynamics.linkage.generator import Motion
+from hpcclear.dynamics.linkage.generator import LookUp, Motion
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
@@ -53,9 +53,13 @@ def motion(effects, lanes, tables, W):
 BANK = 8
 """Lanes of an implicit step's motion."""
 
-_LOOK_UP = """    repeats, intervals = tables[{head} + {repeats}], tables[{head} + {intervals}]
+
+def _look_up(curve: int, one: LookUp) -> str:
+    """Statements before a lane's text: of one tabulated curve, for all lanes."""
+    head, before = curves.HEAD * curve, "".join(f"        {line}\n" for line in one.before)
+    return f"""    repeats, intervals = tables[{head + curves.REPEATS}], tables[{head + curves.INTERVALS}]
     for i in range(W):
-{before}        enter_table(work, {curve}, {place}, {rate}, repeats, intervals, i, W)
+{before}        enter_table(work, {curve}, {one.place}, {one.rate}, repeats, intervals, i, W)
     look_up(work, tables, {curve}, W)
 """
 
@@ -65,18 +69,8 @@ def module_with(motion: Motion, places: Iterable[int]) -> ModuleType:
 
     `places`: of the joints with clearance, in the mechanism's order.
     """
-    looked_up = "".join(
-        _LOOK_UP.format(
-            curve=row - at.CURVES,
-            head=curves.HEAD * (row - at.CURVES),
-            repeats=curves.REPEATS,
-            intervals=curves.INTERVALS,
-            before="".join(f"        {line}\n" for line in one.before),
-            place=one.place,
-            rate=one.rate,
-        )
-        for row, one in ((row, motion.look_ups[name]) for name, row in motion.curves.items())
-    )
+    rows = motion.curves.items()
+    looked_up = "".join(_look_up(row - at.CURVES, motion.look_ups[name]) for name, row in rows)
     kinds = {"bearing" if c.joint.round else "wall" for c in motion.forest.mechanism.contacts}
     called = [name for name in functions() if f" {name}(" in motion.source + looked_up]
     head = _HEAD.format(

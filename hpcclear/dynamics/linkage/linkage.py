@@ -37,9 +37,8 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        self._whole = self._text(
-            _with_impacts(self._on)._replace(pins=True)
-        )  # has the rows of all others
+        # has the rows of all others
+        self._whole = self._text(_with_impacts(self._on)._replace(pins=True))
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [

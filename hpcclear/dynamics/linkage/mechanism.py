@@ -7,19 +7,8 @@ from typing import Any
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Body,
-    Contact,
-    Drive,
-    Joint,
-    LoadTerms,
-    Pair,
-    is_loose,
-    is_pin,
-    places_of,
-    split,
-)
+from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage.parts import GROUND, Body, Contact, Drive, Joint, LoadTerms, Pair
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -47,13 +36,13 @@ class Mechanism:
 
     def at(self, place: str) -> Pair:
         """Where a place is, in its body's axes, m."""
-        name, point = split(place)
+        name, point = parts.split(place)
         return self.ground[point] if name == GROUND else self.body(name).points[point]
 
     @property
     def clearances(self) -> tuple[Joint, ...]:
         """The joints with clearance, in file order."""
-        return tuple(joint for joint in self.joints if is_loose(joint))
+        return tuple(joint for joint in self.joints if parts.is_loose(joint))
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -67,7 +56,7 @@ class Mechanism:
     @property
     def ideal(self) -> tuple[Joint, ...]:
         """The joints without."""
-        return tuple(joint for joint in self.joints if not is_loose(joint))
+        return tuple(joint for joint in self.joints if not parts.is_loose(joint))
 
     @property
     def period(self) -> Drive:
@@ -125,7 +114,7 @@ def joined(mechanism: Mechanism, kinds: tuple[str, ...] = ()) -> list[set[str]]:
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
     for joint in mechanism.ideal if kinds else mechanism.joints:
         if not kinds or joint.kind in kinds:
-            groups = _merged(groups, {split(place)[0] for place in places_of(joint)})
+            groups = _merged(groups, {parts.split(place)[0] for place in parts.places_of(joint)})
     return sorted(groups, key=lambda group: GROUND not in group)
 
 
@@ -161,7 +150,7 @@ def _places(m: Mechanism) -> None:
             place = getattr(one, entry, None)
             if place is None:
                 continue
-            body, point = split(place)
+            body, point = parts.split(place)
             if body not in known:
                 reason, words = f"there is no body {body!r}", set(known)
             elif point not in known[body]:
@@ -179,7 +168,7 @@ def _places(m: Mechanism) -> None:
                 )  # fmt: skip
     _turned(m)
     for joint in m.joints:
-        first, second = (split(place)[0] for place in places_of(joint))
+        first, second = (parts.split(place)[0] for place in parts.places_of(joint))
         if first == second:
             raise InputError(
                 f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
@@ -273,11 +262,11 @@ def massless_angles(m: Mechanism) -> set[str]:
     while len(found) < left:
         left = len(found)
         for joint in m.ideal:
-            (one, point), (two, other) = map(split, places_of(joint))
+            (one, point), (two, other) = map(parts.split, parts.places_of(joint))
             for body, here, carrier in ((one, point, two), (two, other, one)):
                 if body not in found or carrier in found:
                     continue
-                if is_pin(joint):
+                if parts.is_pin(joint):
                     held = tuple(m.body(body).points[here]) != tuple(m.body(body).center)
                 else:
                     held = joint.kind in ("slide", "fixed")

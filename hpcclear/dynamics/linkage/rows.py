@@ -35,15 +35,10 @@ class Rows:
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
     curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
-    places: Mapping[str, int] = field(
-        default_factory=dict
-    )  # on straight tables; rates MAX_CURVES behind
+    # on straight tables; rates MAX_CURVES behind
+    places: Mapping[str, int] = field(default_factory=dict)
 
     def behind(self, bristles: int) -> "Rows":
         """The same of a motion whose coordinates come after so many of bristles."""
-        return replace(
-            self,
-            coordinates=self.coordinates + bristles,
-            velocities=self.velocities + bristles,
-            accelerations=self.accelerations + bristles,
-        )
+        moved = ("coordinates", "velocities", "accelerations")
+        return replace(self, **{name: getattr(self, name) + bristles for name in moved})

@@ -133,21 +133,17 @@ def moved(
     `places` as `bodies_and_points` has them, the others as `followed` takes them; the acceleration (m/s2) of a guided
     body is that along its guide.
     """
-    k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
-    angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
-    drive = {"crank_angle": angle, "crank_speed": speed, "drive_phase": phase}
-    if scene.template is None:
-        return {**drive, **places, **followed(scene, phase, places, acceleration, clearance)}
     names = [body.name for body in mechanism.bodies]
-    return {
-        **{name: drive[name] for name in ("crank_angle", "crank_speed")},
-        **{
-            name: acceleration.real
-            if kind == "acceleration"
-            else places[kind][:, names.index(body)]
-            for name, (kind, body) in scene.template.SERIES.items()
-        },
-    }
+    k = names.index(mechanism.period.body)
+    angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
+    found = {"crank_angle": angle, "crank_speed": speed}
+    if scene.template is None:
+        path = followed(scene, phase, places, acceleration, clearance)
+        return {**found, "drive_phase": phase, **places, **path}
+    for name, (kind, body) in scene.template.SERIES.items():
+        along = kind == "acceleration"
+        found[name] = acceleration.real if along else places[kind][:, names.index(body)]
+    return found
 
 
 def violation(linkage: Linkage, q: Array, v: Array, time: Array) -> Array:

@@ -232,7 +232,7 @@ class Lanes:
             raise RuntimeError("the record is full; take it first")
         if (
             not self._compiled
-        ):  # at the first call, which one rank of a node makes before the others
+        ):  # by the first call, which one rank of a node makes before the others
             self._compile()
         return bool(self._step(*self._arguments(budget)))
 

@@ -134,9 +134,8 @@ def finish_averages(lane, W, work, book, out, slot, settings):
         mean = out[slot, Outcome.mean + ACCELERATION]
         square = out[slot, Outcome.mean + SQUARE]
         across = out[slot, Outcome.mean + ACROSS]
-        out[slot, Outcome.acceleration_deviation] = math.sqrt(
-            max(square - mean * mean - across * across, 0.0)
-        )
+        square = max(square - mean * mean - across * across, 0.0)
+        out[slot, Outcome.acceleration_deviation] = math.sqrt(square)
         out[slot, Outcome.peak_acceleration] = math.sqrt(work[at.PEAK_FOLLOWED * W + lane])
 
 
@@ -175,9 +174,7 @@ def book_averages(lane, W, work, book, time, settings):
         book[(at.AVERAGED + r) * W + lane] += integral
     book[at.TIME_SUM * W + lane] += time
     total = 0.0
-    for k in range(
-        JOINTS - 1, -1, -1
-    ):  # O12 last, which keeps the bits of f as they have always been
+    for k in range(JOINTS - 1, -1, -1):  # O12 last: f has always had these bits
         gap = settings[RunSettings.chosen + k] * work[(at.INTEGRAL + at.GAP + k) * W + lane]
         total += gap * gap
         if work[(at.ACTIVE + k) * W + lane] == 1.0 and work[(at.ENDED + k) * W + lane] == 0.0:

@@ -53,12 +53,8 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
 @scalar_function
 def answer(numbers, rules, block, queue, settings, tables):
     """Do what is requested of one lane; by how much the number of running lanes changes is left in `FOUND`."""
-    asked, lane, W, n = (
-        numbers[Asking.ASKED],
-        numbers[Asking.LANE],
-        numbers[Asking.WIDTH],
-        numbers[Asking.COORDINATES],
-    )
+    asked, lane = numbers[Asking.ASKED], numbers[Asking.LANE]
+    W, n = numbers[Asking.WIDTH], numbers[Asking.COORDINATES]
     ends = True
     status = UNFINISHED
     if asked == END_OF_STEP:
@@ -86,13 +82,9 @@ def special(
     block = block_at(W, work, stages, par, book)
     entries, counts = carray(settings, RunSettings.size), carray(counters, Counter.COUNT)
     slots = counts[Counter.SLOTS]
-    queue = Queue(
-        carray(queued, (slots, int(entries[RunSettings.parameter_rows]))),
-        carray(starts, (slots, Start.size)),
-        carray(out, (slots, Outcome.size)),
-        carray(finished, slots),
-        counts,
-    )
+    parameters = carray(queued, (slots, int(entries[RunSettings.parameter_rows])))
+    begun, done = carray(starts, (slots, Start.size)), carray(out, (slots, Outcome.size))
+    queue = Queue(parameters, begun, done, carray(finished, slots), counts)
     answer(of, rules_in(of), block, queue, entries, carray(tables, at.MAX_CURVES))
 
 

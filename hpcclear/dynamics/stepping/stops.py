@@ -27,12 +27,9 @@ the 2.5th power, and what the gap does between the two is straight."""
 def gap_in_step(lane, W, work, p):
     """Joint p's gap at both ends of a lane's step, and its rates there times the step: d0, m0, d1, m1, of a cubic."""
     h = work[at.STEP * W + lane]
-    return (
-        work[(at.RATE_OLD + at.GAP + p) * W + lane],
-        h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane],
-        work[(at.RATE_NOW + at.GAP + p) * W + lane],
-        h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane],
-    )
+    gap, rate = (at.GAP + p) * W + lane, (at.GAP_RATE + p) * W + lane
+    old, now = at.RATE_OLD * W, at.RATE_NOW * W
+    return work[old + gap], h * work[old + rate], work[now + gap], h * work[now + rate]
 
 
 @lane_event
@@ -86,9 +83,8 @@ def root(d0, m0, d1, m1, end):
         change = step / (1.0 - step * bend)
         new = s - change
         if low <= new <= high and abs(step * bend) < 0.5:  # beyond, it would settle on an extremum
-            left = (
-                change * change * (bend * bend + abs(c3 * inverse))
-            )  # of the change, if it is small
+            # of the change, if it is small
+            left = change * change * (bend * bend + abs(c3 * inverse))
             if left <= 1e-6 and left * abs(change) <= 1e-16 * end:
                 return new
         else:

@@ -136,16 +136,10 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
     of = carray(numbers, NUMBERS)
     work = carray(lanes, (at.STAGES + stages * at.MAX_COORDINATES) * W)
     entries = carray(settings, RunSettings.size)
-    step = Step(
-        work,
-        beyond(work, at.STAGES * W),
-        beyond(work, at.WORK * W),
-        carray(weights, tab.PACKED),
-        of[Asking.COORDINATES],
-        entries[RunSettings.rtol],
-        entries[RunSettings.atol_coordinates : RunSettings.size],
-        of[Asking.WIDTH] & 127,
-    )
+    behind, par = beyond(work, at.STAGES * W), beyond(work, at.WORK * W)
+    rtol, atol = entries[RunSettings.rtol], entries[RunSettings.atol_coordinates : RunSettings.size]
+    n, count = of[Asking.COORDINATES], of[Asking.WIDTH] & 127
+    step = Step(work, behind, par, carray(weights, tab.PACKED), n, rtol, atol, count)
     effects = Stepped(rules_in(of), carray(measures, of[Asking.MEASURES]))
     curves, senses = carray(tables, at.MAX_CURVES), entries[RunSettings.senses]
     observing, motion = of[Asking.OBSERVING], of[Asking.MOTION]

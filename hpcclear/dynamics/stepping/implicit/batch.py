@@ -276,12 +276,8 @@ def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
     W = of[Asking.WIDTH]
     block = block_at(W, work, stages, par, None)
     effects = Stepped(rules_in(of), carray(measures, of[Asking.MEASURES]))
-    moved = Moved(
-        of[Asking.OBSERVING_EIGHT],
-        of[Asking.MOTION_OF_EIGHT],
-        of[Asking.COORDINATES],
-        carray(tables, at.MAX_CURVES),
-    )
+    observing, motion = of[Asking.OBSERVING_EIGHT], of[Asking.MOTION_OF_EIGHT]
+    moved = Moved(observing, motion, of[Asking.COORDINATES], carray(tables, at.MAX_CURVES))
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
     columns.settle_columns(block.work, W, eights)
     for e in range(len(eights)):

@@ -36,9 +36,7 @@ NUMBERS = at.BANK  # row of the first of these numbers; where each begins, each 
     REACH,  # of a difference at most, as a part of LEAST
 ) = range(NUMBERS * COLUMNS, (NUMBERS + 16) * COLUMNS, COLUMNS)
 OWNER = NUMBERS + 16  # 1 + lane of the sample in each column; 0 where there is none
-KNOWN = (
-    OWNER + 1
-)  # 1 where the kink functions at the start of the step are known from the step before
+KNOWN = OWNER + 1  # 1 where kink functions at the start are known from the step before
 FOLLOWS = KNOWN + 1  # 1 where a step begins at the end of the step before
 SHOWN = FOLLOWS + 1  # below 0 where a stage lies beyond a kink
 ASKED = SHOWN + 1  # 1 for columns that the work at hand is for
