@@ -115,6 +115,11 @@ def test_what_the_first_designs_missed_is_found():
     assert missed == 0
 
 
+def steps_apart(point, others):
+    """Least distance of a design from others, over the ranges."""
+    return (abs(others - point) / np.ptp(BOUNDS, axis=1)).max(axis=1).min()
+
+
 SHAPES = {
     "parabola": lambda x: 1e3 * bowl(x), "constant": lambda x: 0.0 * x[:, 0] + 7.0,
     "offset": lambda x: 1e6 + x[:, 0], "steep": lambda x: np.exp(8.0 * x[:, 0]),
@@ -131,11 +136,13 @@ def test_draws_are_had_of_any_values(shape, error, count):
     values = SHAPES[shape](designs)[:, None]
     space = Space(BOUNDS, np.eye(1), (None,), np.empty(0))
     beliefs = Beliefs(known_of(designs, values, error), space, rng)
-    for _ in range(3):
-        point, loss = improvement.drawn(beliefs, np.ones(1))
-        largest = beliefs.variances(np.vstack([designs, point])).max() ** 0.5
-        assert 0.0 <= loss < 10.0 * (largest + beliefs.models[0].rest.scale)
-        beliefs.take(point)
+    points, loss = improvement.drawn(beliefs, np.ones(1), 3)
+    assert len(points) == 3
+    largest = beliefs.variances(np.vstack([designs, points])).max() ** 0.5
+    assert 0.0 <= loss < 10.0 * (largest + beliefs.models[0].rest.scale)
+    for row, point in enumerate(points):
+        others = np.vstack([designs, np.delete(points, row, axis=0)])
+        assert steps_apart(point, others) > improvement.NEAR
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 2868.776])

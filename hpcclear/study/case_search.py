@@ -149,21 +149,19 @@ class CaseSearch:
         """New designs where none is expected to win enough: those that may be the best, as long as the one that is taken for
         it is expected to lose too much to them; then the best of those `left` and where nothing is known, since the models may
         be wrong."""
-        main, rows, apart = self._space.directions[0], list[int](), 1.0
+        main, rows = self._space.directions[0], list[int]()
         size = self._accuracy(beliefs, main)
-        point, loss = improvement.drawn(beliefs, main)
-        others = partial(improvement.drawn, beliefs, main)
+        points, loss = improvement.drawn(beliefs, main, len(left))
         if loss > WORTH * size > 0.0:
             self._idle, self._hope = 0, loss / size
-        else:
-            point, others = (
-                max(left, key=lambda one: one[0])[1],
-                partial(improvement.farthest, beliefs),
-            )
+            for place in points:
+                beliefs.take(place)
+            return self.designs.add(points)
+        point, apart = max(left, key=lambda one: one[0])[1], 1.0
         while apart > 0.0 and len(rows) < len(left):  # of a catalogue none may be left
             beliefs.take(point)
             rows += self.designs.add(point[None])
-            point, apart = others()
+            point, apart = improvement.farthest(beliefs)
         return rows
 
     def _leaders(self, beliefs: Beliefs) -> list[int]:

@@ -78,14 +78,14 @@ def expected(beliefs: Beliefs, direction: Array, margins: Array | None = None) -
     return _best(beliefs, merit)[0]
 
 
-def drawn(beliefs: Beliefs, direction: Array) -> tuple[Array, float]:
-    """The best new design, (d,), by one draw of what is believed of all together (Thompson sampling), and what the design that
-    is believed to be the best is expected to lose to the best of all; 0 where none is new."""
+def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]:
+    """At most so many new designs, (k, d), each the best by one draw of what is believed of all together (Thompson sampling),
+    and what the design that is believed to be the best is expected to lose to the best of all; 0 where none is new."""
     points = np.vstack([beliefs.known.designs[beliefs.allowed], _candidates(beliefs)])
     points = points[beliefs.feasible(points) >= LIKELY]
     new = _apart(points, beliefs)
     if not new.any():
-        return beliefs.known.designs[0], 0.0
+        return points[:0], 0.0
     square = np.zeros((len(points), len(points)))
     for model, weight in zip(beliefs.models, direction, strict=True):
         if model is not None and weight:
@@ -99,7 +99,14 @@ def drawn(beliefs: Beliefs, direction: Array) -> tuple[Array, float]:
     paths = np.tile(mean, (DRAWS, 1))
     paths[:, order - 1] += draws[:, :rank] @ np.tril(factor)[:, :rank].T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)
-    return points[np.where(new, paths[0], np.inf).argmin()], float(loss.mean())
+    width = np.ptp(beliefs.space.bounds, axis=1)
+    rows = list[int]()
+    for path in paths:
+        if len(rows) == count or not new.any():
+            break
+        rows.append(int(np.where(new, path, np.inf).argmin()))
+        new &= (abs(points - points[rows[-1]]) / width).max(axis=1) > NEAR
+    return points[rows], float(loss.mean())
 
 
 def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0) -> Array:
