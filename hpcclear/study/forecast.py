@@ -30,10 +30,14 @@ from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
 LONGEST = 10.0
-"""Seconds that a pilot may take."""
+"""Seconds that pilots may take."""
 
 LEAST = 5
 """Simulations per input that a pilot needs."""
+
+REHEARSALS = 3
+"""Rehearsals, each of a pilot and a seed of its own, as far as pilots stay within `LONGEST`: one is as far off by chance as a
+study, a quarter."""
 
 DESIGNS, LENGTH = 4, 8
 """Designs, and points of each of their replicates, that show how much scatter a surrogate leaves."""
@@ -151,21 +155,27 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     from threadpoolctl import threadpool_limits
 
     study, samples = scene.required_study, extent.samples_of(scene)
-    each = seconds * extent.loads_of(scene)
-    most, least = int(LONGEST / max(each, 1e-9)), LEAST * len(study.models[-1])
-    designs = min(DESIGNS, (most - least) // (REPLICATES * LENGTH))
-    count = min(study.samples, most - designs * REPLICATES * LENGTH)
+    loads = extent.loads_of(scene)
+    most = int(LONGEST / max(seconds * loads, 1e-9))
+    least, looked = LEAST * len(study.models[-1]), REPLICATES * LENGTH
+    times = int(np.clip(most // (study.samples + DESIGNS * looked), 1, REHEARSALS))
+    most //= times
+    designs = min(DESIGNS, (most - least) // looked)
+    count = min(study.samples, most - designs * looked)
     if study.worn or designs < 1 or count < least:
         return sum(samples.values()), seconds
-    pilot = _Pilot(scene, evaluate)
-    run = _Run(scene, Path(), alone(), cast(Checkpoint, None), pilot, lambda text: None)
+    pilot, counts = _Pilot(scene, evaluate), Counter[str]()
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            counts = _rehearsed(run, count, designs, samples)
+            for k in range(times):
+                own = scene.with_({"study.seed": study.seed + k}) if k else scene
+                run = _Run(own, Path(), alone(), cast(Checkpoint, None), pilot, lambda text: None)
+                counts += _rehearsed(run, count, designs, samples)
     except InputError:
         return sum(samples.values()), seconds
-    loads = extent.loads_of(scene)
-    samples |= {name: loads * counts[name] for name in ("search", "verification", "pairs")}
+    samples |= {
+        name: loads * round(counts[name] / times) for name in ("search", "verification", "pairs")
+    }
     return sum(samples.values()), pilot.seconds / pilot.count
 
 
