@@ -11,7 +11,7 @@ from some_laws import row as row_of_law
 
 from hpcclear.base import bits
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts import bearing, wall
+from hpcclear.dynamics.contacts import bearing, forces, wall
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.numbers import row_of, values
@@ -42,9 +42,17 @@ def plain(function, made=None):
         names = {}
         made[code] = types.FunctionType(code.__code__, names)
         for name, value in code.__globals__.items():
-            known = PLAIN.get(value) if callable(value) else None
-            names[name] = known or (plain(value, made) if hasattr(value, "py_func") else value)
+            if value is forces:
+                own = {key: _plain_value(one, made) for key, one in vars(forces).items()}
+                names[name] = types.SimpleNamespace(**own)
+            else:
+                names[name] = _plain_value(value, made)
     return made[code]
+
+
+def _plain_value(value, made):
+    known = PLAIN.get(value) if callable(value) else None
+    return known or (plain(value, made) if hasattr(value, "py_func") else value)
 
 
 def plain_law(law):
