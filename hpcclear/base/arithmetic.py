@@ -65,17 +65,15 @@ def check_count(word: str, given: int) -> None:
         raise FormulaError(f"calls {word} with {given} numbers, which takes {numbers}", remedy)
 
 
-def read(
-    text: str, longest: int, words: Collection[str] = (), example: str = "m2 + m3"
-) -> ast.expr:
+def read(text: str, most: int, words: Collection[str] = (), example: str = "m2 + m3") -> ast.expr:
     """Read a formula: its names are no words, its numbers are finite, and no operation is left between two numbers.
 
     It is Python's arithmetic, ``+ - * / **``; where there are `words`, calls of these, comparisons, ``and``, ``or``, ``not``
     and ``a if c else b`` besides. `example`: a formula, for messages. Raises FormulaError if it is none, is too long or
     nested too deeply, or a part of numbers alone has no finite value.
     """
-    if len(text) > longest:
-        raise FormulaError(f"has more than {longest} characters", "Shorten it")
+    if len(text) > most:
+        raise FormulaError(f"has more than {most} characters", "Shorten it")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

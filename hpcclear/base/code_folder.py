@@ -17,6 +17,7 @@ import llvmlite
 import numba
 import numpy as np
 
+from hpcclear.base.kept import replace
 from hpcclear.base.private import private_folder, refusal
 from hpcclear.base.remarks import remark
 
@@ -55,9 +56,7 @@ def source_key() -> str:
     digest.update(str(root).encode())
     key = digest.hexdigest()[:16]
     with contextlib.suppress(OSError):  # another process reads the old file or the new one
-        part = kept.with_name(f"sources.{os.getpid()}.part")
-        part.write_text(f"{seen} {key} {_check(seen, key)}\n")
-        os.replace(part, kept)
+        replace(kept, f"{seen} {key} {_check(seen, key)}\n".encode())
     return key
 
 

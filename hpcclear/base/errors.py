@@ -88,9 +88,8 @@ def _alike(word: str, one: str) -> float:
 def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
     close = difflib.get_close_matches(word[:80], words, n=3, cutoff=0.6)
-    close.sort(
-        key=lambda one: not one.startswith(word)
-    )  # whoever writes the beginning of a name means it
+    # whoever writes the beginning of a name means it
+    close.sort(key=lambda one: not one.startswith(word))
     if close:
         return f"Did you mean {close[0]!r}?"
     if not words:
@@ -143,16 +142,16 @@ class StorageError(RuntimeError):
 
 
 _USER_ERRORS = {
-    errno.EACCES: "give yourself permission to write there, or choose another place",
-    errno.EPERM: "give yourself permission to write there, or choose another place",
-    errno.EROFS: "the file system is read-only; choose another place",
-    errno.ENOENT: "make the directory first, or choose another place",
-    errno.ENOTDIR: "a part of the path is a file; choose another place",
-    errno.EISDIR: "a directory of this name is in the way; choose another name",
-    errno.ENOTEMPTY: "a directory of this name is in the way; choose another name",
-    errno.EEXIST: "a file of this name is in the way; choose another name",
-    errno.ELOOP: "a symbolic link is in the way; choose another place",
-    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.EACCES: "Give yourself permission to write there, or choose another place",
+    errno.EPERM: "Give yourself permission to write there, or choose another place",
+    errno.EROFS: "The file system is read-only; choose another place",
+    errno.ENOENT: "Make the directory first, or choose another place",
+    errno.ENOTDIR: "A part of the path is a file; choose another place",
+    errno.EISDIR: "A directory of this name is in the way; choose another name",
+    errno.ENOTEMPTY: "A directory of this name is in the way; choose another name",
+    errno.EEXIST: "A file of this name is in the way; choose another name",
+    errno.ELOOP: "A symbolic link is in the way; choose another place",
+    errno.ENAMETOOLONG: "Choose a shorter name",
 }
 _DISK_ERRORS = {
     errno.ENOSPC: "Free some space (or remove files, where there may be only so many), then run the same command again",
@@ -168,12 +167,11 @@ def refused(path: Path, error: OSError | ValueError) -> InputError | StorageErro
     A `ValueError` (a NUL character, text that no file name can be) is a wrong place.
     """
     if isinstance(error, ValueError):
-        return InputError(
-            "output", str(path), "the system does not allow this name", "Choose another name"
-        )
+        reason = "the system does not allow this name"
+        return InputError("output", str(path), reason, "Choose another name")
     reason = os.strerror(error.errno) if error.errno else str(error)
     if error.errno in _USER_ERRORS:
-        return InputError("output", str(path), reason, _USER_ERRORS[error.errno].capitalize())
+        return InputError("output", str(path), reason, _USER_ERRORS[error.errno])
     remedy = _DISK_ERRORS.get(error.errno or 0, "Check the disk, then run the same command again")
     return StorageError(str(path), reason, remedy + "; results written earlier are intact")
 
@@ -216,21 +214,17 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
                 "too few file handles. Raise the limit (ulimit -n), then run the same command again"
             )
         if isinstance(one, OSError) and number in _BAD_NAMES and one.filename is not None:
-            name = (
-                os.fsdecode(one.filename) if isinstance(one.filename, bytes) else str(one.filename)
-            )
-            return InputError(
-                "file", name, os.strerror(number or 0), "Choose another name or place"
-            )
+            name = one.filename
+            name = os.fsdecode(name) if isinstance(name, bytes) else str(name)
+            remedy = "Choose another name or place"
+            return InputError("file", name, os.strerror(number or 0), remedy)
         if isinstance(one, ModuleNotFoundError) and one.name in host.UNIX_MODULES:
             reason = f"this command needs the module {one.name}, which only Unix has"
             return InputError("system", platform.system(), reason, host.WSL)
         if isinstance(one, MemoryError) or number == errno.ENOMEM:
             return _out_of_memory(str(one))
-    limit = host.address_space_limit()
-    if limit is not None and any(
-        isinstance(one, ImportError | SystemError | OSError) for one in chain
-    ):
+    limit, kinds = host.address_space_limit(), (ImportError, SystemError, OSError)
+    if limit is not None and any(isinstance(one, kinds) for one in chain):
         return _out_of_memory(f"the limit of address space is {limit // 2**20} MB")
     return None
 

@@ -1,6 +1,7 @@
 """How to install what a part of the package needs and not everyone has."""
 
 import re
+from contextlib import suppress
 
 
 def installing(extra: str) -> str:
@@ -11,13 +12,10 @@ def installing(extra: str) -> str:
     from importlib import metadata  # takes a tenth of the time in which a scene is checked
 
     wanted = []
-    try:
+    with suppress(metadata.PackageNotFoundError):  # a source tree that is not installed
         for requirement in metadata.requires("hpcclear") or ():
             package, _, condition = requirement.partition(";")
             if re.search(rf"extra == [\"']{extra}[\"']", condition):
                 wanted.append(f"'{package.strip()}'")
-    except metadata.PackageNotFoundError:  # a source tree that is not installed
-        pass
-    return (
-        f"Install it with: pip install {' '.join(wanted) or f'.[{extra}] in a clone of hpcclear'}"
-    )
+    packages = " ".join(wanted) or f".[{extra}] in a clone of hpcclear"
+    return f"Install it with: pip install {packages}"

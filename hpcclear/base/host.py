@@ -145,10 +145,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 def processor() -> str:
     """Return the name of the processor, by which results are compared: equal bits are promised on equal names."""
     described: dict[str, str] = {}
-    with (
-        contextlib.suppress(OSError),
-        open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file,
-    ):
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", errors="replace") as file:
         for line in file:
             name, _, value = line.partition(":")
             described.setdefault(name.strip(), value.strip())

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cache
+from functools import cache, partial
 from inspect import Parameter, Signature, signature
 from typing import Literal
 
@@ -26,29 +26,16 @@ RECORDED = {"objective": "m"} | {
 """Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
 OF_JOINTS = {
-    "gap": "m",
-    "depth": "m",
-    "gap_rate": "m/s",
-    "normal_force": "N",
-    "friction_force": "N",
-    "sliding_speed": "m/s",
-    "direction_x": "",
-    "direction_y": "",
-    "clearance": "m",
-    "bearing_radius": "m",
-    "journal_radius": "m",
-}
+    "gap": "m", "depth": "m", "gap_rate": "m/s", "normal_force": "N", "friction_force": "N", "sliding_speed": "m/s",
+    "direction_x": "", "direction_y": "", "clearance": "m", "bearing_radius": "m", "journal_radius": "m",
+}  # fmt: skip
 """What `Objective.rate` may require of each joint with clearance, with units: distance from the clearance circle, positive in
 contact, and its rate; the same cut at 0; the forces of contact; the sliding speed; the normal from bearing to journal."""
 
 OF_ALL = {
-    "drive_cosine": "",
-    "drive_sine": "",
-    "drive_speed": "rad/s",
-    "drive_torque": "N m",
-    "acceleration_x": "m/s^2",
+    "drive_cosine": "", "drive_sine": "", "drive_speed": "rad/s", "drive_torque": "N m", "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
-}
+}  # fmt: skip
 """What it may require of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
 acceleration of the followed body or point. Nothing of it jumps at the end of a revolution."""
 
@@ -109,11 +96,9 @@ class Objective:
     @property
     def of_joints(self) -> bool:
         """Whether it is made of what joints have."""
-        recorded = () if self.value is None else arguments(self.value)
+        recorded = set() if self.value is None else RECORDED.keys() & set(arguments(self.value))
         rubs = self.rate is not None and not self.whole
-        return (
-            rubs or self.name == "mean-gap" or any(FIELDS[n].per for n in recorded if n in RECORDED)
-        )
+        return rubs or self.name == "mean-gap" or any(FIELDS[name].per for name in recorded)
 
     @property
     def unit_of_rate(self) -> str:
@@ -176,9 +161,8 @@ def _taken(name: str) -> Function:
     return value
 
 
-MEAN_GAP = Objective(
-    "mean gap between journal and bearing", "m", _taken("objective"), name="mean-gap"
-)
+_GAP = "mean gap between journal and bearing"
+MEAN_GAP = Objective(_GAP, "m", _taken("objective"), name="mean-gap")
 """f of eq. 13, the mean distance from the clearance circle, of a scene without a study, and of a study that names no other."""
 
 OURS = {MEAN_GAP.name: MEAN_GAP} | {
@@ -208,17 +192,13 @@ def level_of(name: re.Match[str]) -> Objective:
 
 @cache
 def _level(name: str, force: str, number: float, kilo: str) -> Objective:
-    band = band_of(number * (1000.0 if kilo else 1.0))
+    made = partial(Objective, name=name, band=band_of(number * (1000.0 if kilo else 1.0)))
     at = f"at {number:g} {kilo}Hz, dB re 1e-6 N"
     if force == "frame":
         words = f"third-octave level of the force on the frame {at}"
-        return Objective(
-            words, "", lambda frame_force_level: frame_force_level, name=name, band=band
-        )
+        return made(words, "", lambda frame_force_level: frame_force_level)
     words = f"third-octave level of the contact force {at}, of the joint where it is larger"
-    return Objective(
-        words, "", lambda contact_force_level: contact_force_level.max(), name=name, band=band
-    )
+    return made(words, "", lambda contact_force_level: contact_force_level.max())
 
 
 def _in_band(levels: Array, here: Booleans) -> Array:
@@ -249,12 +229,8 @@ class Usual(IntEnum):
 
 @cache
 def bound(
-    objective: Objective,
-    name: str,
-    places: tuple[int, ...],
-    joints: tuple[int, ...],
-    labels: tuple[str, ...],
-) -> Objective:
+    objective: Objective, name: str, places: tuple[int, ...], joints: tuple[int, ...], labels: tuple[str, ...]
+) -> Objective:  # fmt: skip
     """An objective as a scene names it: of its joints with clearance, by their places in a record, or of chosen ones, by
     their places and labels."""
     words = objective.words

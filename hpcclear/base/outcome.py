@@ -185,13 +185,9 @@ _IMPACTS = {
 """Measures of impact and noise; angles without contact go by time."""
 
 _LEVELS = {
-    "frame_force_level": Field(
-        "1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"
-    ),
-    "contact_force_level": Field(
-        "1", "third-octave level of the contact force, dB re 1e-6 N", per="joint band", when="level"
-    ),
-}
+    "frame_force_level": Field("1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"),
+    "contact_force_level": Field("1", "third-octave level of the contact force, dB re 1e-6 N", per="joint band", when="level"),
+}  # fmt: skip
 
 FIELDS = {
     "sample": Field("1", "number of the sample in the design", "i8"),  # -1 never leaves the evaluator
@@ -282,13 +278,9 @@ def record_type(joints: int = len(JOINTS), bands: int = 0, asked: Collection[str
     names the type of a scene.
     """
     sizes = {"joint": joints, "wave": WAVE_ROWS, "band": bands}
-    return np.dtype(
-        [
-            (name, one.kind, tuple(sizes[per] for per in one.per.split()))
-            for name, one in FIELDS.items()
-            if one.when in ("", *asked)
-        ]
-    )
+    fields = {name: one for name, one in FIELDS.items() if one.when in ("", *asked)}
+    shapes = {name: tuple(sizes[per] for per in one.per.split()) for name, one in fields.items()}
+    return np.dtype([(name, one.kind, shapes[name]) for name, one in fields.items()])
 
 
 OUTCOME = record_type()
@@ -307,12 +299,10 @@ def unknown(count: int, record: np.dtype = OUTCOME) -> np.ndarray:
     return records
 
 
-def failed(
-    sample: int, status: Status, rhs_evaluations: int = 0, record: np.dtype = OUTCOME
-) -> np.ndarray:
-    """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of a `record_type`)."""
+def failed(sample: int, status: Status, work: int = 0, record: np.dtype = OUTCOME) -> np.ndarray:
+    """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of a `record_type`); `work`: its evaluations."""
     found = unknown(1, record)
-    found["sample"], found["status"], found["rhs_evaluations"] = sample, status, rhs_evaluations
+    found["sample"], found["status"], found["rhs_evaluations"] = sample, status, work
     return found
 
 

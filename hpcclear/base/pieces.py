@@ -112,22 +112,15 @@ def _cubics(x: Array, y: Array, interpolation: str) -> Array:
     slope = np.zeros(len(x))  # those of the two ends are not needed
     slope[1:-1] = np.where(np.sign(first) * np.sign(second) > 0, harmonic, 0.0)
     m0, m1 = slope[:-1], slope[1:]
-    return np.column_stack(
-        [y[:-1], m0, (3 * rise - 2 * m0 - m1) / width, (m0 + m1 - 2 * rise) / width**2]
-    )
+    square, cube = (3 * rise - 2 * m0 - m1) / width, (m0 + m1 - 2 * rise) / width**2
+    return np.column_stack([y[:-1], m0, square, cube])
 
 
 def _moved(cubics: Array, by: Array | float) -> Array:
     """The same cubics (n, 4) by powers of the distance from places further on."""
     c0, c1, c2, c3 = cubics.T
-    return np.column_stack(
-        [
-            c0 + by * (c1 + by * (c2 + by * c3)),
-            c1 + by * (2 * c2 + by * 3 * c3),
-            c2 + 3 * by * c3,
-            c3,
-        ]
-    )
+    value, slope = c0 + by * (c1 + by * (c2 + by * c3)), c1 + by * (2 * c2 + by * 3 * c3)
+    return np.column_stack([value, slope, c2 + 3 * by * c3, c3])
 
 
 # ---- where steps of an integration end ---------------------------------------------------------

@@ -49,9 +49,8 @@ def private_folder(variable: str) -> Path:
         remedy = "Set it to a directory of your own with free space"
         raise InputError(variable, os.environ.get(variable), reason, remedy) from None
     atexit.register(shutil.rmtree, last, ignore_errors=True)
-    remark(
-        f"Warning: {'; '.join(refusals)}. Compiled code is not kept: every command compiles anew"
-    )
+    anew = "Compiled code is not kept: every command compiles anew"
+    remark(f"Warning: {'; '.join(refusals)}. {anew}")
     return last
 
 
@@ -83,8 +82,13 @@ def refusal(folder: Path) -> str:
                 return f"can be exchanged by whoever may write to {parent}"
     except OSError as error:
         return f"cannot be made ({error.strerror})"
-    why = _unwritable(folder)
-    return f"cannot be written to ({why})" if why else ""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as trial:
+            trial.write(bytes(_PROBE))
+            trial.flush()
+    except OSError as error:
+        return f"cannot be written to ({error.strerror or error})"
+    return ""
 
 
 def _exchangeable(about: os.stat_result) -> bool:
@@ -114,15 +118,3 @@ def _own_group(about: os.stat_result) -> bool:
         return True
     name, members = host.group_members(about.st_gid)
     return name == user_name() and members <= {user_name()}
-
-
-def _unwritable(folder: Path) -> str:
-    """Return why no file can be written into a folder, made if need be; nothing if one can."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder) as trial:
-            trial.write(bytes(_PROBE))
-            trial.flush()
-    except OSError as error:
-        return error.strerror or str(error)
-    return ""

@@ -44,9 +44,10 @@ class PartSize:
         return np.clip(found, 0.0, 1.0)
 
 
-def part(
-    limits: tuple[float, float], cp: float, cpk: float, towards: str, inspected: bool
-) -> PartSize:
+Limits = tuple[float, float]
+
+
+def part(limits: Limits, cp: float, cpk: float, towards: str, inspected: bool) -> PartSize:
     """A part whose diameters, between two `limits` (m), are normally distributed, by its capability.
 
     Where `cpk`, its capability with the mean off the middle, is less than `cp`, the mean lies `towards` "upper" or "lower".
@@ -71,11 +72,11 @@ class FitClearance:
     upper: float = np.inf
 
     @property
-    def _reach(self) -> tuple[float, float]:
+    def _reach(self) -> Limits:
         return (self.bore.lower - self.pin.upper) / 2.0, (self.bore.upper - self.pin.lower) / 2.0
 
     @property
-    def span(self) -> tuple[float, float]:
+    def span(self) -> Limits:
         """Least and largest value."""
         low, high = self._reach
         return max(low, self.lower), min(high, self.upper)

@@ -22,11 +22,9 @@ _PREFIXES = {
 }  # fmt: skip
 
 
-def _unit(
-    size: Fraction | int, meter: int = 0, gram: int = 0, second: int = 0, radian: int = 0
-) -> Unit:
-    powers = {"meter": meter, "gram": gram, "second": second, "radian": radian}
-    return Fraction(size), {name: Fraction(power) for name, power in powers.items() if power}
+def _unit(size: Fraction | int, *powers: int) -> Unit:
+    named = zip(("meter", "gram", "second", "radian"), powers, strict=False)
+    return Fraction(size), {name: Fraction(power) for name, power in named if power}
 
 
 _INCH, _POUND, _G = Fraction(254, 10_000), Fraction(45_359_237, 10**8), Fraction(980_665, 10**5)
@@ -107,42 +105,22 @@ OTHERS |= {
     for word, symbol in _WORDS.items()
     if short + symbol in UNITS | OTHERS
 }
-OTHERS |= {
-    f"{name}s": unit for name, unit in OTHERS.items() if len(name) > 3 and name[-1] not in "szH"
-}
+_PLURAL = [name for name in OTHERS if len(name) > 3 and name[-1] not in "szH"]
+OTHERS |= {f"{name}s": OTHERS[name] for name in _PLURAL}
 """Units that are read besides: the SI's in full words, and those of other systems."""
 
 SPELLINGS = {
     name: symbol
     for symbol, names in {
-        "rpm": "RPM Rpm UPM Upm upm U/min r.p.m. r.p.m",
-        "rps": "RPS",
-        "turn": "rev revs Rev U r tr Umdr",
-        "deg": "° º Deg DEG degCA °CA CAD degKW °KW",
-        "kg": "Kg KG kgs Kgs kilo kilos",
-        "g": "gms",
-        "lb": "lbs lbm Lb LB",
-        "kN": "KN",
-        "GPa": "Gpa gpa GPA",
-        "MPa": "Mpa MPA",
-        "kPa": "kpa Kpa KPa",
-        "Pa": "PA",
-        "bar": "Bar BAR bara",
-        "psi": "PSI psia",
-        "Hz": "hz HZ",
-        "kHz": "khz KHz Khz",
-        "mm": "㎜",
-        "um": "micron microns",
-        "in": '" ″ inch inches Inch',
-        "s": "sec secs",
-        "min": "Min mins",
-        "h": "hr hrs",
-        "kgf": "kp",
-        "rad": "rads",
+        "rpm": "RPM Rpm UPM Upm upm U/min r.p.m. r.p.m", "rps": "RPS", "turn": "rev revs Rev U r tr Umdr",
+        "deg": "° º Deg DEG degCA °CA CAD degKW °KW", "rad": "rads", "kg": "Kg KG kgs Kgs kilo kilos", "g": "gms",
+        "lb": "lbs lbm Lb LB", "kN": "KN", "kgf": "kp", "GPa": "Gpa gpa GPA", "MPa": "Mpa MPA", "kPa": "kpa Kpa KPa",
+        "Pa": "PA", "bar": "Bar BAR bara", "psi": "PSI psia", "Hz": "hz HZ", "kHz": "khz KHz Khz", "mm": "㎜",
+        "um": "micron microns", "in": '" ″ inch inches Inch', "s": "sec secs", "min": "Min mins", "h": "hr hrs",
         "%": "percent pct",
     }.items()
     for name in names.split()
-}
+}  # fmt: skip
 SPELLINGS |= {f"bar{end}": "bar" for end in ("(a)", " a", " abs", " (abs)", " absolute", "(abs)")}
 """Other spellings that leave no doubt of what is meant."""
 
@@ -223,9 +201,8 @@ def tidy(text: str) -> str:
         raise NoUnit
     plain = unicodedata.normalize("NFKC", text.translate(_FOREIGN)).translate(_FOREIGN)
     plain = re.sub(r"(?<=\w)\s+per\s+(?=\w)", "/", plain.strip().replace("''", '"'))
-    plain = _CRANK_ANGLE.sub(
-        "deg", plain if plain in TURNS_BY_TIME else SPELLINGS.get(plain, plain)
-    )
+    spelled = plain if plain in TURNS_BY_TIME else SPELLINGS.get(plain, plain)
+    plain = _CRANK_ANGLE.sub("deg", spelled)
     # a dot or hyphen between two names is a product: "N.m", "ft-lbf"
     return re.sub(r"(?<=[A-Za-z\d])[.-](?=[A-Za-z])", "*", plain)
 

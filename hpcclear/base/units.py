@@ -57,13 +57,11 @@ def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
         return []
     known = {name: name for name in UNITS}
     known |= {head + tail: f"{head}*{tail}" for head, tail in itertools.product(HEADS, TAILS)}
-    choices = [
-        (
-            name,
-            *(known[one] for one in known if one.isascii() and one.casefold() == name.casefold()),
-        )
-        for name, _, _ in factors
-    ]
+    alike: dict[str, list[str]] = {}
+    for one, symbol in known.items():
+        if one.isascii():
+            alike.setdefault(one.casefold(), []).append(symbol)
+    choices = [(name, *alike.get(name.casefold(), ())) for name, _, _ in factors]
     found = []
     for names in itertools.islice(itertools.product(*choices), 64):
         text = ""
@@ -166,12 +164,8 @@ def note_turns(text: str, number: str, unit: str, target: str) -> None:
 
 
 _EXAMPLES = {
-    "m": '"0.3 mm"',
-    "rad/s": '"5000 rpm"',
-    "Pa": '"206.8 GPa"',
-    "rad": '"30 deg"',
-    "Hz": '"20 Hz"',
-}
+    "m": '"0.3 mm"', "rad/s": '"5000 rpm"', "Pa": '"206.8 GPa"', "rad": '"30 deg"', "Hz": '"20 Hz"',
+}  # fmt: skip
 
 
 def to_si(text: str, target: str, decided: bool = False) -> float:
@@ -262,11 +256,8 @@ def may_be_thousands(number: str) -> bool:
 def check_thousands(text: str) -> None:
     """Raise UnitError where the number of a text may be read in two ways."""
     number, rest = _digits(text)
-    if (
-        not _THOUSANDS.fullmatch(number)
-        or re.match(r"[eE][+-]?\d", rest)
-        or _POWER_OF_TEN.match(rest)
-    ):
+    raised = re.match(r"[eE][+-]?\d", rest) or _POWER_OF_TEN.match(rest)
+    if raised or not _THOUSANDS.fullmatch(number):
         return
     decimal, whole = number.replace(",", "."), re.sub("[.,]", "", number)
     short = decimal.rstrip("0").rstrip(".")
@@ -302,9 +293,8 @@ def mended(text: str) -> str:
     whole = raised is None and not re.match(r"[eE][+-]?\d", rest)
     between = "Write the digits of a number without signs or spaces between them"
     grouped = _GROUPS.fullmatch(number)
-    if grouped and (
-        whole or not may_be_thousands(number)
-    ):  # before a power of ten they are decimals
+    # before a power of ten they are decimals
+    if grouped and (whole or not may_be_thousands(number)):
         decimals = f".{grouped[3]}" if grouped[3] else ""
         return f"{between}: {re.sub(r'[^0-9+-]', '', grouped[1])}{decimals}{rest}"
     if re.fullmatch(r"[+-]?\d*,\d+", number):

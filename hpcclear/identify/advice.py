@@ -5,6 +5,7 @@ for members that a regression was not fitted to give the half-width to expect; t
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -46,28 +47,18 @@ def noise_of(spectrum: Spectrum, share: float, samples: float) -> Array:
 
 
 def advice(
-    ensemble: Ensemble,
-    names: Sequence[str],
-    sensor: Sensor,
-    frequency: float,
-    share: float,
-    seed: int,
-) -> Advice:
+    ensemble: Ensemble, names: Sequence[str], sensor: Sensor, frequency: float, share: float, seed: int
+) -> Advice:  # fmt: skip
     """Return what each signal would give; `share`: its noise over its RMS."""
-    width, related = [], []
-    for name in names:
-        rows = [
-            _expected(ensemble, name, sensor, frequency, share, count, seed)
-            for count in REVOLUTIONS
-        ]
-        width.append([one for one, _ in rows])
-        related.append([one for _, one in rows])
-    narrowest = np.minimum.accumulate(np.array(width), axis=1)  # more revolutions are no worse
-    return Advice(tuple(names), narrowest, np.array(related))
+    expected = partial(_expected, ensemble, sensor, frequency, share, seed)
+    found = [[expected(name, count) for count in REVOLUTIONS] for name in names]
+    width, related = (np.array([[one[k] for one in row] for row in found]) for k in (0, 1))
+    narrowest = np.minimum.accumulate(width, axis=1)  # more revolutions are no worse
+    return Advice(tuple(names), narrowest, related)
 
 
 def _expected(
-    ensemble: Ensemble, name: str, sensor: Sensor, frequency: float, share: float, count: int, seed: int
+    ensemble: Ensemble, sensor: Sensor, frequency: float, share: float, seed: int, name: str, count: int
 ) -> tuple[Array, float]:  # fmt: skip
     """Half-widths (unknowns,) and the largest correlation."""
     seen = ensemble.spectrum(name)

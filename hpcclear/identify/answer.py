@@ -12,14 +12,7 @@ from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.single import SHORTEST
-from hpcclear.identify.advice import (
-    NOISE,
-    REVOLUTIONS,
-    Advice,
-    advice,
-    largest_correlation,
-    noise_of,
-)
+from hpcclear.identify import advice as advising
 from hpcclear.identify.features import Layout
 from hpcclear.identify.history import history, seconds_of
 from hpcclear.identify.inputs import Inputs
@@ -55,9 +48,8 @@ def run_identify(
         reason = "the time to it needs signals of two dates or more"
         raise InputError("--limit", str(settings.limit), reason, "Give --date for each --signal")
     place = Place.of_file(output, options.fresh)
-    with Session(
-        place, {**run_key(scene, "identify"), **settings.key()}, ranks, options
-    ) as session:
+    key = {**run_key(scene, "identify"), **settings.key()}
+    with Session(place, key, ranks, options) as session:
         content = session.found("identify")
         if content is None:
             session.describe(scene)
@@ -69,7 +61,7 @@ def run_identify(
 def _identified(
     scene: Scene, inputs: Inputs, times: Array, session: Session, settings: Settings
 ) -> Results:
-    """The dataset of what was found."""
+    """What was found."""
     if settings.pressure and settings.signals:
         scene = loaded(scene, settings.signals[0], settings.pressure)
     plain, seed = prepared_scene(scene), 0 if scene.study is None else scene.study.seed
@@ -84,19 +76,16 @@ def _identified(
         for path in settings.signals
     ]
     layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
-    style = session.options.style
-    ensemble = ensemble_of(
-        plain, inputs, every, settings.size(), seed, session.ranks, session.opened(), style
-    )
-    with session.ranks.stage("posterior"):
-        found = [
-            _verdict(ensemble, row, own, settings.sensor, seed)
-            for row, own in zip(tables, layouts, strict=True)
-        ]
+    size, ranks, sensor = settings.size(), session.ranks, settings.sensor
+    kept, style = session.opened(), session.options.style
+    ensemble = ensemble_of(plain, inputs, every, size, seed, ranks, kept, style)
+    with ranks.stage("posterior"):
+        records = zip(tables, layouts, strict=True)
+        found = [_verdict(ensemble, row, own, sensor, seed) for row, own in records]
         gains = None
         if settings.advise:
-            share = settings.noise or NOISE
-            gains = advice(ensemble, every, settings.sensor, frequency, share, seed)
+            share = settings.noise or advising.NOISE
+            gains = advising.advice(ensemble, every, sensor, frequency, share, seed)
     return identified(ensemble, found, times, gains, settings, seed, session.attributes)
 
 
@@ -130,12 +119,11 @@ def _noise(measured: Measured, share: float | None) -> float | None:
     """Standard deviation of noise in a harmonic, where it is known."""
     if share is None:
         return None
-    samples = measured.samples
-    return float(np.sqrt(noise_of(measured.spectrum, share, samples)[1]))
+    return float(np.sqrt(advising.noise_of(measured.spectrum, share, measured.samples)[1]))
 
 
 def identified(
-    ensemble: Ensemble, found: Found, times: Array, gains: Advice | None, settings: Settings, seed: int,
+    ensemble: Ensemble, found: Found, times: Array, gains: advising.Advice | None, settings: Settings, seed: int,
     attributes: Mapping[str, object],
 ) -> Results:  # fmt: skip
     """Return the dataset of kind ``identify``; `times` (records,), s."""
@@ -161,17 +149,16 @@ def identified(
             "feature": np.array(features, str),
         }
         data |= _of_records(found, particles, features, len(units)) | {"elapsed": times}
-        grown = history(
-            times,
-            particles[:, :, : len(units)],
-            limit,
-            np.random.default_rng([seed, 0x6869]),
-            np.array([verdict.explained for _, verdict in found]),
-        )
+        explained = np.array([verdict.explained for _, verdict in found])
+        rng = np.random.default_rng([seed, 0x6869])
+        grown = history(times, particles[:, :, : len(units)], limit, rng, explained)
         if grown is not None:
             data |= {"rate": grown.rate, "time_to_limit": grown.time}
     if gains is not None:
-        coords |= {"candidate": np.array(gains.names, str), "revolutions": np.array(REVOLUTIONS)}
+        coords |= {
+            "candidate": np.array(gains.names),
+            "revolutions": np.array(advising.REVOLUTIONS),
+        }
         data |= {"expected_half_width": gains.half_width, "expected_correlation": gains.correlation}
     further = {
         **attributes, "members": len(ensemble.places), "failed_members": ensemble.failed,
@@ -194,7 +181,7 @@ def _of_records(
         "interval": np.stack([one.interval.T for one in verdicts]),
         "widening": np.stack([made.calibration.widening for made, _ in found]),
         "coverage": np.stack([made.calibration.coverage for made, _ in found]),
-        "correlation": np.array([largest_correlation(one[:, :unknowns]) for one in particles]),
+        "correlation": np.array([advising.largest_correlation(p[:, :unknowns]) for p in particles]),
         "explained": np.array([one.explained for one in verdicts], np.int8),
         "doubt": np.array([one.doubt for one in verdicts]),
         "worst_feature": np.array([own[v.worst] for v, own in zip(verdicts, places, strict=True)]),

@@ -45,12 +45,8 @@ class Layout:
         highest = min(measured.highest, int(min(sensor.band[1] / frequency, ORDERS)))
         if highest <= max(lowest, 1):
             reason = f"no harmonic of {frequency:.4g} Hz in {name} passes"
-            raise InputError(
-                "--band",
-                "{:g}:{:g}".format(*sensor.band),
-                reason,
-                "Widen the band, or sample faster",
-            )
+            band = "{:g}:{:g}".format(*sensor.band)
+            raise InputError("--band", band, reason, "Widen the band, or sample faster")
         orders = tuple(range(lowest, highest + 1))
         return cls(name, orders, _thirds(LOW + 1, highest), measured.synchronised, noise)
 
@@ -76,11 +72,9 @@ class Layout:
             for k in self.orders
             for part in (parts if k else parts[:1])
         ]
-        own += [f"harmonics {a} to {b} of {self.name}" for a, b in self.bands]
-        return (
-            *own,
-            *(f"scatter of harmonics {a} to {b} of {self.name}" for a, b in self.scattered),
-        )
+        for words, bands in (("", self.bands), ("scatter of ", self.scattered)):
+            own += [f"{words}harmonics {a} to {b} of {self.name}" for a, b in bands]
+        return tuple(own)
 
     def values(self, seen: Spectrum, measured: bool = False) -> tuple[Array, Array]:
         """Return the features (..., p) of a spectrum and their variances (..., p).

@@ -35,9 +35,8 @@ def seconds_of(dates: tuple[str, ...], count: int) -> Array:
         remedy = "Write dates as 2026-11-27"
         raise InputError("--date", ", ".join(dates), "is not a date", remedy) from None
     if (np.diff(days) <= 0.0).any():
-        raise InputError(
-            "--date", ", ".join(dates), "dates do not rise", "Sort the signals by date"
-        )
+        listed = ", ".join(dates)
+        raise InputError("--date", listed, "dates do not rise", "Sort the signals by date")
     return DAY * (days - days[0])
 
 
@@ -70,7 +69,6 @@ def history(
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(now >= limit, 0.0, np.where(rate > 0.0, (limit - now) / rate, np.inf))
     levels = (0.025, 0.5, 0.975)
-    ends = np.quantile(
-        left, levels, axis=0, method="higher"
-    )  # infinite ones are no numbers to average
+    # infinite ones are no numbers to average
+    ends = np.quantile(left, levels, axis=0, method="higher")
     return History(np.quantile(rate, levels, axis=0), ends)

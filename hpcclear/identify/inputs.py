@@ -15,6 +15,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.streams import generator, sobol
 
 
@@ -58,6 +59,12 @@ class Nuisance:
     centre: float
     """What its law is added to; 0 where it gives values."""
 
+    @classmethod
+    def of(cls, scene: Scene, row: RandomInput) -> "Nuisance":
+        """Return that of a random input."""
+        centre = 0.0 if row.absolute else scene.number(row.paths[0])
+        return cls(row.name, row.paths, row.law, centre)
+
 
 @dataclass(frozen=True)
 class Inputs:
@@ -82,21 +89,15 @@ class Inputs:
         own = tuple(Unknown.of(scene, words) for words in unknowns)
         taken = [path for one in own for path in one.paths]
         if len(set(taken)) < len(taken):
-            raise InputError(
-                "--unknown", ", ".join(unknowns), "two drive the same entry", "Drop one"
-            )
+            listed = ", ".join(unknowns)
+            raise InputError("--unknown", listed, "two drive the same entry", "Drop one")
         study = scene.study
         rows = () if study is None else study.random
-        kept = tuple(
-            Nuisance(
-                row.name, row.paths, row.law, 0.0 if row.absolute else scene.number(row.paths[0])
-            )
-            for row in rows
-            if not set(row.paths) & set(taken)
-        )
+        kept = tuple(Nuisance.of(scene, row) for row in rows if not set(row.paths) & set(taken))
         made = cls(own, kept, None if study is None else study.correlation)
         plain = scene.with_({"study": None})
-        corners = np.vstack([np.full(made.size, 0.5), *_bounds(len(own), made.size)])
+        corners = np.full((3, made.size), 0.5)  # all at their medians; unknowns at their bounds
+        corners[1:, : len(own)] = [[0.0], [1.0]]
         check_points(plain, made.points(corners), lambda row: "--unknown")
         return made
 
@@ -113,18 +114,13 @@ class Inputs:
     def values(self, places: Array) -> Array:
         """Return the inputs (n, size), SI, at places (n, size or more) of the unit cube."""
         count = len(self.unknowns)
-        lower, upper = (
-            np.array([getattr(one, end) for one in self.unknowns]) for end in ("lower", "upper")
-        )
+        lower, upper = np.array([(one.lower, one.upper) for one in self.unknowns]).T
         own = lower + places[:, :count] * (upper - lower)
         chances = [np.clip(column, 1e-9, 1.0 - 1e-9) for column in places[:, count : self.size].T]
         if self.correlation is not None:
             chances = self.correlation.together([one.name for one in self.nuisances], chances)
-        rest = [
-            one.centre + one.law(column)
-            for one, column in zip(self.nuisances, chances, strict=True)
-        ]
-        return np.column_stack([own, *rest])
+        drawn = zip(self.nuisances, chances, strict=True)
+        return np.column_stack([own, *(one.centre + one.law(chance) for one, chance in drawn)])
 
     def points(self, places: Array) -> Points:
         """Return the designs at places (n, size or more)."""
@@ -134,14 +130,8 @@ class Inputs:
     def variants(self, places: Array) -> list[dict[str, float]]:
         """Return the entries of the scene at each of the places (n, size or more)."""
         points = self.points(places)
-        return [
-            {
-                path: float(value)
-                for value, paths in zip(row, points.paths, strict=True)
-                for path in paths
-            }
-            for row in points.values
-        ]
+        driven = [(k, path) for k, paths in enumerate(points.paths) for path in paths]
+        return [{path: float(row[k]) for k, path in driven} for row in points.values]
 
     def sensor_errors(self, places: Array, sensor: Sensor) -> tuple[Array, Array]:
         """Return gain and angle errors (n,) of a sensor at places (n, size + 2)."""
@@ -149,16 +139,6 @@ class Inputs:
 
         drawn = ndtri(np.clip(places[:, self.size : self.size + 2], 1e-9, 1.0 - 1e-9))
         return sensor.gain_error * drawn[:, 0], sensor.angle_error * drawn[:, 1]
-
-
-def _bounds(unknowns: int, size: int) -> list[Array]:
-    """Places at the lower and the upper bounds of all unknowns, the other inputs at their medians."""
-    found = []
-    for end in (0.0, 1.0):
-        place = np.full(size, 0.5)
-        place[:unknowns] = end
-        found.append(place)
-    return found
 
 
 def design(seed: int, inputs: Inputs, members: int) -> Array:

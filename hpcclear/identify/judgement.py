@@ -74,11 +74,9 @@ class Judgement:
 
 def features_of(measured: Sequence[Measured], layouts: Sequence[Layout]) -> tuple[Array, Array]:
     """Return the features (p,) of the signals of one measurement, and their variances (p,)."""
-    pairs = [
-        layout.values(one.spectrum, measured=True)
-        for one, layout in zip(measured, layouts, strict=True)
-    ]
-    return np.concatenate([own for own, _ in pairs]), np.concatenate([own for _, own in pairs])
+    each = zip(measured, layouts, strict=True)
+    values, variances = zip(*(own.values(one.spectrum, True) for one, own in each), strict=True)
+    return np.concatenate(values), np.concatenate(variances)
 
 
 def members_of(
@@ -86,15 +84,13 @@ def members_of(
 ) -> tuple[Array, Array]:
     """Return the features (n, p) of the members as a sensor has them, and their variances (n, p)."""
     errors = ensemble.inputs.sensor_errors(ensemble.places, sensor)
-    pairs = [
-        layout.values(sensed(ensemble.spectrum(layout.name), sensor, frequency, *errors))
-        for layout in layouts
-    ]
-    return np.concatenate([own for own, _ in pairs], 1), np.concatenate(
-        [own for _, own in pairs], 1
-    )
+    seen = (sensed(ensemble.spectrum(own.name), sensor, frequency, *errors) for own in layouts)
+    pairs = (own.values(one) for own, one in zip(layouts, seen, strict=True))
+    values, variances = zip(*pairs, strict=True)
+    return np.concatenate(values, 1), np.concatenate(variances, 1)
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads change the last bits
 def prepare(
     ensemble: Ensemble, layouts: Sequence[Layout], sensor: Sensor, frequency: float, variance: Array,
     seed: int, members: int = CALIBRATED,
@@ -103,14 +99,6 @@ def prepare(
 
     Raises InputError: fewer members than the models need.
     """
-    with threadpool_limits(limits=1, user_api="blas"):  # more threads change the last bits
-        return _prepared(ensemble, layouts, sensor, frequency, variance, seed, members)
-
-
-def _prepared(
-    ensemble: Ensemble, layouts: Sequence[Layout], sensor: Sensor, frequency: float, variance: Array,
-    seed: int, members: int,
-) -> Prepared:  # fmt: skip
     clean, own = members_of(ensemble, layouts, sensor, frequency)
     size, unknowns = ensemble.inputs.size, len(ensemble.inputs.unknowns)
     further = [size + k for k, error in enumerate((sensor.gain_error, sensor.angle_error)) if error]
@@ -147,17 +135,11 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
     inputs, unknowns = prepared.ensemble.inputs, len(prepared.ensemble.inputs.unknowns)
     middle = np.median(found[:, :unknowns], axis=0)
     wide = found.copy()
-    factor = prepared.calibration.widening * _poor(doubt)
+    # a poor fit widens intervals: the model is off by about as much more than its own scatter
+    factor = prepared.calibration.widening * float(np.exp(0.5 * max(0.0, doubt - POOR)))
     wide[:, :unknowns] = np.clip(middle + factor * (found[:, :unknowns] - middle), 0.0, 1.0)
-    size = inputs.size
-    physical = inputs.values(wide[:, :size])
+    physical = inputs.values(wide[:, : inputs.size])
     interval = np.quantile(physical[:, :unknowns], LEVELS, axis=0)
     score = np.abs(values - mean) / deviation
-    return Judgement(
-        physical, interval, doubt, doubt < REFUSED, int(np.argmax(score)), values, mean, deviation
-    )  # fmt: skip
-
-
-def _poor(doubt: float) -> float:
-    """By how much a poor fit widens intervals: the model is off by about as much more than its own scatter."""
-    return float(np.exp(0.5 * max(0.0, doubt - POOR)))
+    worst = int(np.argmax(score))
+    return Judgement(physical, interval, doubt, doubt < REFUSED, worst, values, mean, deviation)

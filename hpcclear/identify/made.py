@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulated
@@ -53,19 +52,13 @@ def write_made(
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
         one = signal(found, name, "signal")
-        values, unit = one.values, one.unit
         if one.counted:  # whole events since the sample before, which have no noise
-            count = np.round(np.interp(places, turns, np.cumsum(values)))
+            count = np.round(np.interp(places, turns, np.cumsum(one.values)))
             columns.append(np.diff(count, prepend=count[0]))
         else:
-            sampled = make_interp_spline(turns, values, k=3)(places)
+            sampled = make_interp_spline(turns, one.values, k=3)(places)
             columns.append(sampled + noise * sampled.std() * rng.standard_normal(len(places)))
-        headings.append(name if unit == "1" else f"{name} [{unit}]")
-    _write(Path(path), headings, columns)
-
-
-def _write(path: Path, headings: Sequence[str], columns: Sequence[Array]) -> None:
-    rows = "\n".join(
-        ",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)
-    )
-    path.write_text(f"{','.join(headings)}\n{rows}\n", encoding="utf-8")
+        headings.append(name if one.unit == "1" else f"{name} [{one.unit}]")
+    np.savetxt(
+        path, np.column_stack(columns), "%.9g", ",", header=",".join(headings), comments="", encoding="utf-8"
+    )  # fmt: skip

@@ -65,17 +65,15 @@ def read_measured(
         remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
         raise InputError("--signal", str(path), "has neither time nor crank angle", remedy)
     if (np.diff(place) <= 0.0).any():
-        raise InputError(
-            "--signal", str(path), "time or crank angle does not rise", "Sort its rows"
-        )
+        reason = "time or crank angle does not rise"
+        raise InputError("--signal", str(path), reason, "Sort its rows")
     if not np.isfinite(values).all():
         raise InputError("--signal", str(path), "has cells without a number", "Remove these rows")
     found = harmonics(place, values, count) if place[-1] - place[0] >= 1.0 else np.empty((0, 1))
     if len(found) < FEWEST:
         reason = f"holds {len(found)} whole revolutions"
-        raise InputError(
-            "--signal", str(path), reason, f"Record {FEWEST} or more: their scatter is its noise"
-        )
+        remedy = f"Record {FEWEST} or more: their scatter is its noise"
+        raise InputError("--signal", str(path), reason, remedy)
     rate = len(place) / float(place[-1] - place[0])
     known = frequency
     if seconds is not None:
@@ -116,10 +114,8 @@ def _column(sheet: Sheet, name: str) -> SheetColumn:
     found = [one for one in sheet.signals if one.name.strip() == name] or sheet.signals
     if len(found) == 1:
         return found[0]
-    listed = ", ".join(one.heading for one in found)
-    raise InputError(
-        "--signal", sheet.path, f"has no column {name!r}", f"Call one so. It has: {listed}"
-    )
+    remedy = f"Call one so. It has: {', '.join(one.heading for one in found)}"
+    raise InputError("--signal", sheet.path, f"has no column {name!r}", remedy)
 
 
 def _frequency(time: Array, values: Array, nominal: float) -> float:
@@ -140,7 +136,5 @@ def _frequency(time: Array, values: Array, nominal: float) -> float:
 
     step = 1.0 / (4.0 * span * len(orders))
     count = int(DRIFT * nominal / step)
-    tried = nominal + step * np.arange(-count, count + 1)
-    best = float(tried[np.argmax([power(float(one)) for one in tried])])
-    fine = best + step * np.linspace(-1.0, 1.0, 41)
-    return float(fine[np.argmax([power(float(one)) for one in fine])])
+    best = max((nominal + step * np.arange(-count, count + 1)).tolist(), key=power)
+    return float(max((best + step * np.linspace(-1.0, 1.0, 41)).tolist(), key=power))

@@ -14,6 +14,7 @@ doi:10.1111/j.1467-9868.2006.00553.x; V. Vovk, A. Gammerman and G. Shafer, "Algo
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -85,12 +86,8 @@ class Model:
     ) -> "Model":
         """Fit the models; shapes as above, the first `unknowns` of the inputs are identified."""
         bounds = np.tile([0.0, 1.0], (places.shape[1], 1))
-        models = tuple(
-            fit_kriging(
-                places, column, bounds, rng=rng, restarts=0, lengths=LENGTHS, kernel="matern-5/2"
-            )
-            for column in summaries.T
-        )
+        fit = partial(fit_kriging, rng=rng, restarts=0, lengths=LENGTHS, kernel="matern-5/2")
+        models = tuple(fit(places, column, bounds) for column in summaries.T)
         missed = np.column_stack([one.leave_one_out() for one in models]) - summaries
         missed[~np.isfinite(missed)] = 0.0
         scatter, covariance = _scatter(places[:, :unknowns], missed)
@@ -99,9 +96,8 @@ class Model:
         likelihoods = tuple(
             Likelihood(tuple(_without(m, rows) for m in models), scatter, inverse) for rows in kept
         )
-        return cls(
-            places, summaries, rest, likelihoods, tuple(_inverse(rest[rows]) for rows in kept)
-        )
+        distances = tuple(_inverse(rest[rows]) for rows in kept)
+        return cls(places, summaries, rest, likelihoods, distances)
 
     def posterior(
         self, summaries: Array, particles: int, rng: np.random.Generator, group: int = -1
@@ -169,9 +165,8 @@ def sequential(
         weights = np.exp(step * (values - values.max()))
         chosen = _resampled(weights / weights.sum(), rng)
         places, values = places[chosen], values[chosen]
-        factor = np.linalg.cholesky(
-            np.cov(places.T).reshape(dimensions, -1) + 1e-12 * np.eye(dimensions)
-        )
+        covariance = np.cov(places.T).reshape(dimensions, -1)
+        factor = np.linalg.cholesky(covariance + 1e-12 * np.eye(dimensions))
         for _ in range(MOVES):
             jump = rng.standard_normal(places.shape) @ factor.T * (2.38 * size / dimensions**0.5)
             tried = np.abs(places + jump) % 2.0  # reflected at both ends

@@ -77,13 +77,9 @@ class Spectrum:
 
 
 USUAL = (
-    "crank_moment",
-    "slider_acceleration",
-    "followed_acceleration_x",
-    "followed_acceleration_y",
-    "frame_force_x",
-    "frame_force_y",
-)
+    "crank_moment", "slider_acceleration", "followed_acceleration_x", "followed_acceleration_y",
+    "frame_force_x", "frame_force_y",
+)  # fmt: skip
 """Signals that people measure first."""
 
 

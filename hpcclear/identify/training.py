@@ -49,15 +49,11 @@ class Ensemble:
 
 def prepared_scene(scene: Scene) -> Scene:
     """Return the scene as its members are simulated: without a study, with enough instants and revolutions."""
-    numerics = scene.numerics
-    return scene.with_(
-        {
-            "study": None,
-            "numerics.target_error": None,
-            "numerics.averaged_revolutions": max(numerics.averaged_revolutions, LEAST_REVOLUTIONS),
-            "output.instants_per_revolution": INSTANTS * turns_of(scene.linkage),
-        }
-    )
+    averaged = max(scene.numerics.averaged_revolutions, LEAST_REVOLUTIONS)
+    return scene.with_({
+        "study": None, "numerics.target_error": None, "numerics.averaged_revolutions": averaged,
+        "output.instants_per_revolution": INSTANTS * turns_of(scene.linkage),
+    })  # fmt: skip
 
 
 def ensemble_of(

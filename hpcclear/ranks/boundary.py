@@ -131,16 +131,14 @@ def _watch(ranks: Ranks) -> Watch:
             text += ", and the system reports: its process has ended, or its node or the network is gone"
         else:
             text += f" for {seconds:g} s (HPCCLEAR_SILENCE): its process, its node or the network is gone"
+        report = f"{text}. What was finished is saved", Exit.FAILED, None
         if ranks.is_root:
-            mail.notify_itself(
-                Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
-            )
-            return
-        if rank == ranks.mail.neighbours[0]:  # root, or the way to it
+            mail.notify_itself(Message(rank, Tag.ERROR, report))
+        elif rank == mail.neighbours[0]:  # root, or the way to it
             _say(f"{text}. Rank {ranks.rank} on {socket.gethostname()} ends")
             stop.leave_within(0.0, Exit.FAILED)
         else:
-            mail.send(0, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
+            mail.send(0, Tag.ERROR, report)
 
     orphaned = functools.partial(stop.request, "the process that started it is gone")
     is_orphan = functools.partial(launcher.is_orphan, parents) if parents else None
@@ -199,22 +197,23 @@ def _load_mpi() -> Any:
             mpi4py.rc.initialize = mpi4py.rc.finalize = False  # begun and ended here, on purpose
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:
-        raise InputError(
-            "MPI library",
-            "none",
-            f"mpi4py cannot load one ({' '.join(str(error).split())})",
-            "Load the site's MPI module, or set MPI4PY_LIBMPI to its libmpi. To have one of your own: "
-            + installing("mpich").partition(": ")[2],
-        ) from error
+        reason = f"mpi4py cannot load one ({' '.join(str(error).split())})"
+        remedy = "Load the site's MPI module, or set MPI4PY_LIBMPI to its libmpi. To have one of your own: "
+        remedy += installing("mpich").partition(": ")[2]
+        raise InputError("MPI library", "none", reason, remedy) from error
     return MPI
 
 
 def _open_mail(patience: float = PATIENCE) -> Mail:
     if not launcher.is_launched() and "mpi4py.MPI" not in sys.modules:
         return Mail()
-    mpi = _load_mpi()
+    mpi, (variable, copies) = _load_mpi(), launcher.launched_size()
     if mpi.Is_finalized():  # by an earlier call in this process, and MPI starts only once
-        return _after_mpi()
+        if copies > 1:  # which do not find each other without it
+            reason = "this process left MPI after an earlier run, and MPI cannot be started twice"
+            remedy = "Import mpi4py.MPI at the top of the script, which keeps MPI until its end"
+            raise InputError(variable, copies, reason, remedy)
+        return Mail()
     begins = not mpi.Is_initialized()
     if begins:
         with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
@@ -223,27 +222,12 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
             faulthandler.dump_traceback_later(patience, exit=True, file=2)
             mpi.Init_thread()
             faulthandler.cancel_dump_traceback_later()
-    variable, copies = launcher.launched_size()
     if copies > 1 and mpi.COMM_WORLD.size == 1:
-        raise InputError(
-            variable,
-            copies,
-            f"the launcher started {copies} processes, but each sees only itself: the launcher "
-            f"does not belong to the MPI library in use ({describe_mpi()})",
-            "Start with the mpiexec of that library, or set MPI4PY_LIBMPI to the launcher's; with "
-            "srun, choose the right --mpi",
-        )
+        reason = f"the launcher started {copies} processes, but each sees only itself: the launcher"
+        reason += f" does not belong to the MPI library in use ({describe_mpi()})"
+        remedy = "Start with the mpiexec of that library, or set MPI4PY_LIBMPI to the launcher's"
+        raise InputError(variable, copies, reason, remedy + "; with srun, choose the right --mpi")
     return Mail(mpi, finalizes=begins)
-
-
-def _after_mpi() -> Mail:
-    """The mailbox of a process that has left MPI: of one process, for without MPI copies do not find each other."""
-    variable, copies = launcher.launched_size()
-    if copies > 1:
-        reason = "this process has left MPI after an earlier run, and MPI cannot be started twice"
-        remedy = "Import mpi4py.MPI at the top of the script, which keeps MPI until the script ends"
-        raise InputError(variable, copies, reason, remedy)
-    return Mail()
 
 
 def _ended(ranks: Ranks, error: BaseException | None) -> int:
@@ -251,8 +235,6 @@ def _ended(ranks: Ranks, error: BaseException | None) -> int:
     code: int = Exit.DONE
     text = note = ""
     match error:
-        case None:
-            pass
         case Stopped():
             code, text = Exit.STOPPED, f"Stopped early: {error}. {ranks.stop_switch.outlook}."
         case InputError():
@@ -263,7 +245,7 @@ def _ended(ranks: Ranks, error: BaseException | None) -> int:
             code, note = error.code, str(error)
         case SystemExit():
             code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
-        case _:
+        case BaseException():
             user_error = isinstance(mendable(error), InputError)
             code = Exit.BAD_INPUT if user_error else Exit.FAILED
             text = _report(ranks, error)

@@ -18,21 +18,11 @@ _SIZE = (
     "SLURM_STEP_NUM_TASKS",  # srun; SLURM_NTASKS would also stand in a batch script without srun
 )
 _RANK = (
-    "PMI_RANK",
-    "OMPI_COMM_WORLD_RANK",
-    "MV2_COMM_WORLD_RANK",
-    "PMIX_RANK",
-    "PALS_RANKID",
-    "MPIRUN_RANK",
-    "ALPS_APP_PE",
-)
+    "PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "PALS_RANKID", "MPIRUN_RANK", "ALPS_APP_PE",
+)  # fmt: skip
 _THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "BLIS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
+    "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+)  # fmt: skip
 
 
 def launched_size(environment: Mapping[str, str] = os.environ) -> tuple[str, int]:

@@ -51,7 +51,7 @@ def run_points(
     with contextlib.closing(progress), ranks.timed(task.name) as spent:
         if not book.done:
             lead.work(task, spent)
-            ranks.forget_queue()
+            ranks.queue = None
     return earlier[:0] if lead.kept is None else lead.kept.records()
 
 

@@ -188,13 +188,11 @@ class Mail:
     def meet_on_node(self) -> None:
         """Wait until every rank of this node is here."""
         if self._mpi is not None:
-            request, backoff = self._node.Ibarrier(), Backoff()
-            while not self._is_complete(request):
+            request, backoff, complete = self._node.Ibarrier(), Backoff(), False
+            while not complete:
                 backoff.wait()
-
-    def _is_complete(self, request: Any) -> bool:
-        with self._lock:
-            return bool(request.Test())
+                with self._lock:
+                    complete = request.Test()
 
     def finalize(self) -> None:
         """Leave MPI; every rank must come."""

@@ -24,13 +24,9 @@ class Progress:
     """
 
     def __init__(
-        self,
-        label: str,
-        style: Style = "auto",
-        interval: float | None = None,
-        stream: TextIO | None = None,
+        self, label: str, style: Style = "auto", interval: float | None = None, stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._label = label
         self._style = style
         usual = 30.0 if "SLURM_JOB_ID" in os.environ else 5.0  # batch logs are read later
@@ -68,8 +64,7 @@ class Progress:
         counted = (self._done, self._failed)
         if self._style == "bar":
             assert self._stream is not None
-            share = self._share()
-            draw(self._stream, f"{self._label}: {self.text()}, {self._eta()}", share)
+            draw(self._stream, f"{self._label}: {self.text()}, {self._eta()}", self._share())
         elif counted != self._counted or now - self._written >= SIGN_OF_LIFE:
             self._counted, self._written = counted, now
             self._write(f"{self.text()}, {self._eta()}")

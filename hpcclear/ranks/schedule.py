@@ -154,10 +154,9 @@ class HandOut:
         """Indices of samples for the requesting rank (none when nothing is left), and when it requests more."""
         self._rate = need.rate
         size, ask_below = allot(self.remaining, self._ranks, need)
-        first, self._next = self._next, self._next + size
-        index = (
-            np.arange(first, self._next) if self._queue is None else self._queue[first : self._next]
-        )
+        index = np.arange(self._next, self._next + size)
+        self._next += size
+        index = index if self._queue is None else self._queue[index]
         self.outstanding += size
         return index, ask_below
 

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from enum import IntEnum
-from types import FrameType, TracebackType
+from types import FrameType
 
 from hpcclear.base.host import STOP_SIGNALS
 from hpcclear.ranks.launcher import launched_rank
@@ -122,12 +122,7 @@ class StopSwitch:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if self._ends_process:
             for number in STOP_SIGNALS:
                 signal.signal(number, signal.SIG_IGN)

@@ -23,19 +23,22 @@ from hpcclear.ranks.work_queue import WorkQueue
 FLUSH_INTERVAL = 1.0
 """Seconds that a finished record waits on a rank at most."""
 
+Call = Callable[[Any, "Ranks"], object]
+"""What each rank does once, with a payload."""
+
 
 class Ranks:
     """The processes of one job. Made by `run_on_ranks`, or by `alone` for one process; `is_root`: this one runs the program.
 
     `stage_seconds`: on root, seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`; every row of a
-    stage adds up to its wall time.
+    stage adds up to its wall time. `queue`: the samples in hand, if there are some.
     """
 
     def __init__(self, mail: Mail, stop: StopSwitch) -> None:
         self.mail = mail
         self.stop_switch = stop
         self._stage = "start"
-        self._queue: WorkQueue | None = None
+        self.queue: WorkQueue | None = None
         self._unsent: list[np.ndarray] = []
         self._writing = Stopwatch()  # output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
@@ -60,7 +63,7 @@ class Ranks:
     @property
     def where(self) -> str:
         """Rank, stage and, after an error of the worker, its samples: for reports."""
-        samples = [] if self._queue is None else self._queue.suspects
+        samples = [] if self.queue is None else self.queue.suspects
         shown = ", ".join(map(str, samples[:8])) + (", ..." if len(samples) > 8 else "")
         place = f"rank {self.rank} of {self.size} in stage '{self._stage}'"
         if len(samples) > 1:
@@ -83,9 +86,7 @@ class Ranks:
         """Count root's time inside as output of the stage under way."""
         return self._writing.running()
 
-    def everywhere(
-        self, name: str, function: Callable[[Any, "Ranks"], object], payload: object
-    ) -> None:
+    def everywhere(self, name: str, function: Call, payload: object) -> None:
         """Call `function(payload, ranks)` of a module once on every rank, and wait until all have returned; on root.
 
         `name`: for reports and timing; the time is booked as set-up. Raises Stopped if requested to end early, RankFailed if
@@ -107,7 +108,7 @@ class Ranks:
                     self.heed(message)
             self.raise_if_stopped()
 
-    def _call(self, function: Callable[[Any, "Ranks"], object], payload: object) -> float:
+    def _call(self, function: Call, payload: object) -> float:
         """Do this rank's share of a call; the seconds it took."""
         started = time.perf_counter()
         function(payload, self)
@@ -140,20 +141,16 @@ class Ranks:
         elif message.tag == Tag.ERROR:
             raise RankFailed(*message.body[:2])
 
-    def forget_queue(self) -> None:
-        """No sample is in hand any more."""
-        self._queue = None
-
     def make_queue(self, task: Task) -> tuple[WorkQueue, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
         mark = pickle.dumps((task.make, task.payload)) if self.size > 1 else b""
         if mark != self._known:  # of a stage like the last one it is known how long samples take
             self._known, self._recent = mark, np.zeros(2)
-        self._queue = WorkQueue(task.make(task.payload, self), recent=self._recent)
+        self.queue = WorkQueue(task.make(task.payload, self), recent=self._recent)
         working = self.size if task.workers is None else task.workers
-        self._queue.exhausted = self.rank >= working
-        return self._queue, time.perf_counter() - started
+        self.queue.exhausted = self.rank >= working
+        return self.queue, time.perf_counter() - started
 
     def serve(self, ahead: Sequence[str] = ()) -> NoReturn:
         """Work for root, stage after stage, until it says to leave; load the modules `ahead` while it says nothing yet."""
@@ -170,7 +167,7 @@ class Ranks:
             elif message.tag == Tag.STAGE:
                 self._stage = message.body.name
                 self._serve_stage(message.body)
-                self._queue = None
+                self.queue = None
                 backoff.reset()
             elif message.tag == Tag.CALL:
                 self._stage, function, payload = message.body

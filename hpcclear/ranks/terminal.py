@@ -36,12 +36,8 @@ def write(text: str) -> None:
     clear()
     lines = plain(text).splitlines()
     if terminal():
-        lines = [
-            textwrap.fill(line, WIDTH, break_long_words=False, break_on_hyphens=False)
-            if len(line) > WIDTH
-            else line
-            for line in lines
-        ]
+        fill = functools.partial(textwrap.fill, break_long_words=False, break_on_hyphens=False)
+        lines = [fill(line, WIDTH) if len(line) > WIDTH else line for line in lines]
     sys.stderr.write("\n".join([*lines, ""]))
     sys.stderr.flush()
 

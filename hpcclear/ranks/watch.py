@@ -87,13 +87,9 @@ class Watch:
     """
 
     def __init__(
-        self,
-        mail: Mail,
-        seconds: float,
-        on_loss: Callable[[int], object],
-        on_orphan: Callable[[], object],
+        self, mail: Mail, seconds: float, on_loss: Callable[[int], object], on_orphan: Callable[[], object],
         is_orphan: Callable[[], bool] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._mail = mail
         self._neighbours = {rank: Neighbour() for rank in mail.neighbours}
         self._period = min(seconds / BEATS, _LONGEST) if seconds else _LONGEST

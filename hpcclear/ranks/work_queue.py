@@ -16,11 +16,8 @@ class WorkQueue:
     """
 
     def __init__(
-        self,
-        worker: Worker,
-        clock: Callable[[], float] = time.perf_counter,
-        recent: np.ndarray | None = None,
-    ) -> None:
+        self, worker: Worker, clock: Callable[[], float] = time.perf_counter, recent: np.ndarray | None = None
+    ) -> None:  # fmt: skip
         self._worker = worker
         self._clock = clock
         self._in_hand: set[int] = set()

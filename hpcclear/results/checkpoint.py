@@ -34,6 +34,10 @@ _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
 
 
+Samples = tuple[np.ndarray, np.ndarray]
+"""Records (n,) and designs (n, k)."""
+
+
 def unfinished(directory: Path) -> bool:
     """Whether a directory holds work to go on from: files of a `Checkpoint` that was not finished."""
     names = [path.name for path in directory.glob("*.nc")]
@@ -61,13 +65,13 @@ def discard(directory: Path) -> None:
 
 @dataclass
 class _Part:
-    """One file; `span`: its least and largest sample; `held`: its records (n,) and designs (n, k), unless there are so many
-    that only the file has them."""
+    """One file; `span`: its least and largest sample; `held`: its samples, unless there are so many that only the file has
+    them."""
 
     level: int
     path: Path
     span: tuple[int, int]
-    held: tuple[np.ndarray, np.ndarray] | None
+    held: Samples | None
 
 
 class Checkpoint:
@@ -147,9 +151,8 @@ class Checkpoint:
             self._written = self._clock()
             return
         with self._watch.running():
-            records = np.concatenate([records for records, _ in self._buffer])
-            values = np.concatenate([values for _, values in self._buffer])
-            self._write_part(0, records, values)
+            records, values = zip(*self._buffer, strict=True)
+            self._write_part(0, np.concatenate(records), np.concatenate(values))
             self._buffer.clear()
             self._merge()
         self._written = self._clock()
@@ -158,7 +161,7 @@ class Checkpoint:
         """Samples on disk and in memory, by growing number, each once; shape (n,): all, or those of `count` from `first` on."""
         return self.contents(first, count)[0]
 
-    def contents(self, first: int = 0, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def contents(self, first: int = 0, count: int | None = None) -> Samples:
         """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
         last = np.inf if count is None else first + count
         parts = [part for part in self._parts if part.span[1] >= first and part.span[0] < last]
@@ -188,18 +191,15 @@ class Checkpoint:
         numbers = records["sample"]
         self._parts.append(_Part(level, path, (int(numbers.min()), int(numbers.max())), held))
 
-    def _held(self, part: _Part) -> tuple[np.ndarray, np.ndarray]:
-        """A part's records and designs, from memory or from its file; raises InputError if that was damaged meanwhile."""
-        if part.held is not None:
-            return part.held
-        content = dataset.read(part.path, "samples")
-        return recast(dataset.records(content), self.record), self._designs(content)
+    def _held(self, part: _Part) -> Samples:
+        """A part's samples, from memory or from its file; raises InputError if that was damaged meanwhile."""
+        return part.held or self._samples(dataset.read(part.path, "samples"))
 
-    def _designs(self, content: Results) -> np.ndarray:
-        """Designs (n, k) of a part, a column for each name."""
-        designs = designs_in(content)
+    def _samples(self, content: Results) -> Samples:
+        """Those that a part file has, a column of designs for each name."""
+        records, designs = recast(dataset.records(content), self.record), designs_in(content)
         columns = [designs[name] for name in self.units]
-        return np.stack(columns, 1) if columns else np.empty((content.sizes["sample"], 0))
+        return records, np.stack(columns, 1) if columns else np.empty((len(records), 0))
 
     def _merge(self) -> None:
         while True:
@@ -208,9 +208,8 @@ class Checkpoint:
             if level is None:
                 return
             old = [part for part in self._parts if part.level == level]
-            held = [self._held(part) for part in old]
-            merged = _join([records for records, _ in held], [values for _, values in held])
-            self._write_part(level + 1, *merged)
+            records, values = zip(*map(self._held, old), strict=True)
+            self._write_part(level + 1, *_join(records, values))
             # a kill in between leaves samples twice, which `_join` mends
             for part in old:
                 part.path.unlink(missing_ok=True)
@@ -293,17 +292,13 @@ class Checkpoint:
         if set(designs_in(content)) != set(self.units):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
-        records = recast(dataset.records(content), self.record)
-        self._keep(level, path, records, self._designs(content))
+        self._keep(level, path, *self._samples(content))
 
 
-def _join(
-    records: Sequence[np.ndarray], values: Sequence[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
+def _join(records: Sequence[np.ndarray], values: Sequence[np.ndarray]) -> Samples:
     """One array of each, by growing sample number, each sample once."""
-    joined, designs = (
-        one[0] if len(one) == 1 else np.concatenate(one) for one in (records, values)
-    )
+    whole = len(records) == 1
+    joined, designs = (one[0] if whole else np.concatenate(one) for one in (records, values))
     numbers = joined["sample"]
     if (numbers[1:] > numbers[:-1]).all():  # as a rule; copies count
         return joined, designs

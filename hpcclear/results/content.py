@@ -8,7 +8,7 @@ because xarray and pandas take a quarter of a second to load.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 Place: TypeAlias = "int | np.integer | slice | list[int] | np.ndarray"
 """Where to look along a dimension: at one place, which takes the dimension away, or at several."""
-
-Other = TypeVar("Other")
 
 
 class Variable:
@@ -29,13 +27,9 @@ class Variable:
     """
 
     def __init__(
-        self,
-        dims: tuple[str, ...],
-        values: np.ndarray,
-        attrs: Mapping[str, object] | None = None,
-        name: str = "",
+        self, dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, object] | None = None, name: str = "",
         labels: Mapping[str, np.ndarray] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         if len(dims) != values.ndim:
             raise ValueError(f"an array of shape {values.shape} has not the dimensions {dims}")
         self.dims, self.values, self.attrs = dims, values, dict[str, Any](attrs or {})
@@ -80,9 +74,7 @@ class Variable:
     def __len__(self) -> int:
         return len(self.values)
 
-    def __array__(
-        self, dtype: np.typing.DTypeLike | None = None, copy: bool | None = None
-    ) -> np.ndarray:
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.values, dtype, copy=copy)
 
     def __float__(self) -> float:
@@ -109,11 +101,8 @@ class Results:
     """
 
     def __init__(
-        self,
-        variables: Mapping[str, Variable],
-        attrs: Mapping[str, object] | None = None,
-        chosen: Sequence[str] = (),
-    ) -> None:
+        self, variables: Mapping[str, Variable], attrs: Mapping[str, object] | None = None, chosen: Sequence[str] = ()
+    ) -> None:  # fmt: skip
         self.attrs, self.sizes = dict[str, Any](attrs or {}), dict[str, int]()
         for name, one in variables.items():
             for dim, size in zip(one.dims, one.values.shape, strict=True):
@@ -122,11 +111,8 @@ class Results:
         for name in self.sizes.keys() & variables.keys():
             if variables[name].dims != (name,):
                 raise ValueError(f"{name!r} names a dimension and a data variable")
-        self.labels = {
-            name: one.values
-            for name, one in variables.items()
-            if name in self.sizes or name in chosen
-        }
+        coords = self.sizes.keys() | set(chosen)
+        self.labels = {name: one.values for name, one in variables.items() if name in coords}
         self.variables = {
             name: Variable(one.dims, one.values, one.attrs, name, self.labels)
             for name, one in variables.items()
@@ -171,12 +157,6 @@ class Results:
     def assign_attrs(self, **attrs: object) -> Results:
         """Return these results with further global attributes."""
         return Results(self.variables, {**self.attrs, **attrs}, tuple(self.labels))
-
-    @overload
-    def get(self, name: str) -> Variable | None: ...
-
-    @overload
-    def get(self, name: str, default: Other) -> Variable | Other: ...
 
     def get(self, name: str, default: Any = None) -> Any:
         """Return a variable, or the default where this name is missing."""

@@ -50,9 +50,8 @@ def _graph(directory: Path, found: Mapping[Path, Results]) -> list[dict[str, Any
     above = [one for path, one in found.items() if path.parent == directory] or found.values()
     scenes = {_stated([one], "scene_hash"): _stated([one], "scene") for one in above}
     everywhere = {name: _stated(found.values(), name) for name in _STATED}
-    ended = datetime.fromtimestamp(max(path.stat().st_mtime for path in found), UTC).isoformat(
-        timespec="seconds"
-    )
+    last = max(path.stat().st_mtime for path in found)
+    ended = datetime.fromtimestamp(last, UTC).isoformat(timespec="seconds")
     command = next((str(one["command"].item()) for one in found.values() if "command" in one), "")
     descriptor = {
         "@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": CRATE},
@@ -63,12 +62,8 @@ def _graph(directory: Path, found: Mapping[Path, Results]) -> list[dict[str, Any
         "description": f"Simulations of a mechanism with clearance joints, by {everywhere['source']}",
         "datePublished": ended, "license": everywhere["license"], "hasPart": parts, "mentions": {"@id": "#run"},
     }  # fmt: skip
-    profile = {
-        "@id": PROFILE,
-        "@type": "CreativeWork",
-        "name": "Process Run Crate",
-        "version": "0.5",
-    }
+    name = "Process Run Crate"
+    profile = {"@id": PROFILE, "@type": "CreativeWork", "name": name, "version": "0.5"}
     program = {
         "@id": "#hpcclear", "@type": "SoftwareApplication", "name": "hpcclear",
         "softwareVersion": everywhere["hpcclear_version"], "softwareRequirements": everywhere["versions"],

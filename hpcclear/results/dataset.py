@@ -14,19 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hpcclear.base import outcome
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import (
-    FIELDS,
-    JOINTS,
-    JUDGED,
-    MAPPED,
-    ON_REQUEST,
-    STEADY,
-    WAVE_ROWS,
-    record_type,
-    unknown,
-)
 from hpcclear.results import netcdf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.faults import fault_of
@@ -92,11 +82,13 @@ def dataset(
     return Results(variables, {**fixed, **(attributes or {})})
 
 
-def _variable(
-    name: str, row: FileVariable, values: ArrayLike, sizes: Mapping[str, int]
-) -> Variable:
-    words = row.dtype == "text" and not isinstance(values, np.ndarray)
-    array = np.array(values, str) if words else np.asarray(values)
+Sizes = Mapping[str, int]
+"""Of dimensions."""
+
+
+def _variable(name: str, row: FileVariable, values: ArrayLike, sizes: Sizes) -> Variable:
+    listed = row.dtype == "text" and not isinstance(values, np.ndarray)
+    array = np.array(values, str) if listed else np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
         raise ValueError(f"{name} has shape {array.shape}, not {expected} {row.dims}")
@@ -117,12 +109,8 @@ def _variable(
 
 
 def _design_row(
-    name: str,
-    data: Mapping[str, ArrayLike],
-    units: Mapping[str, str],
-    words: Mapping[str, str],
-    table: ResultKind,
-) -> tuple[FileVariable, dict[str, str]]:
+    name: str, data: Mapping[str, ArrayLike], units: Mapping[str, str], words: Mapping[str, str], table: ResultKind,
+) -> tuple[FileVariable, dict[str, str]]:  # fmt: skip
     """Row and further attributes of a design variable, or of a limit of one."""
     dims, base, start, role = table.design_dims, name, "", ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
@@ -132,10 +120,8 @@ def _design_row(
     unit = "1" if unit == "" else unit
     if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    return FileVariable(dims, unit, start + words.get(base, long_name), "f8"), {
-        "role": role,
-        "scene_path": base,
-    }
+    row = FileVariable(dims, unit, start + words.get(base, long_name), "f8")
+    return row, {"role": role, "scene_path": base}
 
 
 def variable_name(name: str, kind: str = "samples") -> str:
@@ -144,11 +130,10 @@ def variable_name(name: str, kind: str = "samples") -> str:
     Raises InputError: the name is no name, or a result is called so.
     """
     plain = name.replace(".", "_")
+    reason = "a result has this name" if plain in KINDS[kind].table else ""
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", plain) is None:
         reason = "a name consists of letters, digits and underscores, a letter first"
-        raise InputError("study.variables", name, reason, "Choose another name")
-    if plain in KINDS[kind].data or plain in KINDS[kind].coords:
-        reason = "a result has this name"
+    if reason:
         raise InputError("study.variables", name, reason, "Choose another name")
     return plain
 
@@ -161,7 +146,7 @@ def samples_dataset(
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     words: Mapping[str, str] | None = None,
-    joints: Sequence[str] = JOINTS,
+    joints: Sequence[str] = outcome.JOINTS,
     labels: Sequence[str] = (),
 ) -> Results:
     """Outcome records (n,), in any order, and the designs they belong to (n, k), SI, as results of kind ``samples``, by
@@ -181,16 +166,15 @@ def samples_dataset(
         records, values = records[order], values[order]
     if np.any(np.diff(records["sample"]) == 0):
         raise ValueError("a sample occurs twice")
-    data = {variable_name(name): values[:, i] for i, name in enumerate(names)}
-    if len(data) != len(names):
+    if len(set(map(variable_name, names))) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    fields = records.dtype.names or ()
-    optional = {*ON_REQUEST, *STEADY, *MAPPED} & {*fields}
+    fields, further = records.dtype.names or (), {*outcome.ON_REQUEST, *outcome.JUDGED}
+    optional = (further - {"regime"}) & {*fields}
     asked = {name for name in optional if np.isfinite(records[name]).any()}
     if records["regime"].any():  # no period anywhere is an answer as well
-        asked |= {*STEADY, "regime"}
-    left_out = {"sample", "band", *({*ON_REQUEST, *JUDGED} - asked)}
+        asked |= {*outcome.STEADY, "regime"}
+    left_out = {"sample", "band", *(further - asked)}
     kept = [name for name in fields if name not in left_out]
     bands = _bands_of(records)
     data |= {name: records[name] for name in kept}
@@ -198,7 +182,7 @@ def samples_dataset(
         data["label"] = np.array(labels, dtype=str)[order]
     coords: dict[str, ArrayLike] = {"sample": records["sample"], "joint": joints}
     if "sliding_waves" in kept:
-        coords["wave"] = np.arange(WAVE_ROWS)
+        coords["wave"] = np.arange(outcome.WAVE_ROWS)
     if len(bands):
         coords["band"] = bands
     return dataset("samples", coords, data, attributes, units, objective, words)
@@ -222,9 +206,9 @@ def _bands_of(records: np.ndarray) -> np.ndarray:
 
 def records(samples: Results) -> np.ndarray:
     """The outcome records in results of kind ``samples``, shape (n,), with the fields that it has."""
-    asked = {FIELDS[str(name)].when for name in samples.variables if name in FIELDS}
-    kind = record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
-    found = unknown(samples.sizes["sample"], kind)
+    asked = {outcome.FIELDS[name].when for name in samples.variables if name in outcome.FIELDS}
+    kind = outcome.record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
+    found = outcome.unknown(samples.sizes["sample"], kind)
     for name in kind.names or ():
         if name in samples:
             found[name] = samples[name].to_numpy()
@@ -247,9 +231,10 @@ def write(content: Results, path: str | os.PathLike[str]) -> None:
     netcdf.save(content, _path(path))
 
 
-def read(
-    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
-) -> Results:
+FilePath = str | os.PathLike[str]
+
+
+def read(path: FilePath, kind: str | None = None, scene_hash: str | None = None) -> Results:
     """Read a result file into memory and check it against the table; of a kind and made from a scene, if these are given.
 
     Raises InputError: the file is missing, cut off, changed, foreign, of another kind or scene, or says what cannot be.
@@ -271,12 +256,10 @@ def files_in(directory: Path) -> list[Path]:
 
     Raises InputError: there is no such directory, or no result in it.
     """
-    if not directory.is_dir():
-        reason = "this is a file" if directory.exists() else "there is no such directory"
-        raise InputError("directory", str(directory), reason, "Name the directory a run wrote to")
     found = [*sorted(directory.glob("*.nc")), *sorted((directory / "responses").glob("*.nc"))]
     if not found:
-        reason = "there is no result file in it"
+        reason = "this is a file" if directory.exists() else "there is no such directory"
+        reason = "there is no result file in it" if directory.is_dir() else reason
         raise InputError("directory", str(directory), reason, "Name the directory a run wrote to")
     return found
 
@@ -293,7 +276,6 @@ def each_in(directory: Path) -> Iterator[tuple[Path, Results | InputError]]:
 def _path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if "\0" in text:
-        raise InputError(
-            "file", text, "a path cannot contain a NUL character", "Choose another name"
-        )
+        reason = "a path cannot contain a NUL character"
+        raise InputError("file", text, reason, "Choose another name")
     return Path(text)

@@ -27,9 +27,8 @@ def grid(content: xr.Dataset) -> xr.Dataset:
 def cells_of(content: Results) -> Results:
     """Return what `grid` does, of results; raises InputError as it does."""
     if SHAPE not in content.attrs:
-        raise InputError(
-            "map", content.attrs.get("hpcclear_kind"), "is no map", "Make one with hpcclear map"
-        )
+        kind = content.attrs.get("hpcclear_kind")
+        raise InputError("map", kind, "is no map", "Make one with hpcclear map")
     shape = tuple(int(n) for n in str(content.attrs[SHAPE]).split())
     names = [k for k, v in content.data_vars.items() if v.attrs.get("role") == "design_variable"]
     found = {}

@@ -23,18 +23,13 @@ def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
     Raises InputError: the keys differ; the message lists where.
     """
     found = key_of(content)
-    differ = [name for name in sorted({*found, *key}) if found.get(name) != key.get(name)]
-    if differ:
-        shown = [
-            f"{n}: {_short(found.get(n))} there, {_short(key.get(n))} now" for n in differ[:10]
-        ]
-        more = f"; and {len(differ) - 10} more" if len(differ) > 10 else ""
-        raise InputError(
-            "output",
-            str(place),
-            f"it contains results of another run ({'; '.join(shown)}{more})",
-            "Choose another output, or start a new run beside it with --fresh",
-        )
+    pairs = {name: (found.get(name), key.get(name)) for name in sorted({*found, *key})}
+    shown = [f"{n}: {_short(a)} there, {_short(b)} now" for n, (a, b) in pairs.items() if a != b]
+    if shown:
+        listed = shown if len(shown) <= 10 else [*shown[:10], f"and {len(shown) - 10} more"]
+        reason = f"it contains results of another run ({'; '.join(listed)})"
+        remedy = "Choose another output, or start a new run beside it with --fresh"
+        raise InputError("output", str(place), reason, remedy)
 
 
 def key_of(content: Results) -> dict[str, object]:

@@ -29,13 +29,11 @@ SEAL = b"\nhpcclear seal sha256:"
 
 _SEAL_LENGTH = len(SEAL) + 64 + 1
 _DTYPES = ("<f8", "<f4", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8")
-_NO_VARIABLE = (
-    "This is a netCDF dimension but not a netCDF variable. %9d"  # wording fixed by NetCDF-4
-)
+_BARE = b"This is a netCDF dimension"
+_NO_VARIABLE = f"{_BARE.decode()} but not a netCDF variable. %9d"  # wording fixed by NetCDF-4
 _HIDDEN = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_FillValue"}
-_ATTRIBUTE_LIMIT = (
-    30_000  # bytes; HDF5 keeps at most 64 kB in an object header, longer text goes to the heap
-)
+# bytes; HDF5 keeps at most 64 kB in an object header, longer text goes to the heap
+_ATTRIBUTE_LIMIT = 30_000
 
 
 def read_bytes(path: Path) -> bytes:
@@ -60,9 +58,8 @@ def read_bytes(path: Path) -> bytes:
             found = file.read(_SEAL_LENGTH)
             # looked at first, so that a foreign giant is not read into memory
             if not found.startswith(SEAL):
-                raise bad(
-                    "hpcclear did not write it, or it was cut off or changed afterwards", again
-                )
+                foreign = "hpcclear did not write it, or it was cut off or changed afterwards"
+                raise bad(foreign, again)
             file.seek(0)
             content = file.read(about.st_size - _SEAL_LENGTH)
     except OSError as error:
@@ -136,9 +133,7 @@ def _encode_dimension(file: h5py.File, name: str, number: int, content: Results)
     scale.attrs["_Netcdf4Dimid"] = np.int32(number)
 
 
-def _encode_variable(
-    file: h5py.File, name: str, variable: Variable, *, filled: bool
-) -> h5py.Dataset:
+def _encode_variable(file: h5py.File, name: str, variable: Variable, filled: bool) -> h5py.Dataset:
     values = variable.values
     dtype = values.dtype.newbyteorder("<")
     fill = None
@@ -175,35 +170,24 @@ def decode(content: bytes) -> Results:
     """
     coordinates, data = {}, {}
     with h5py.File(io.BytesIO(content), "r") as file:
-        names = list(file)
-        for name in names:
+        for name in file:
             if not isinstance(file.get(name, getlink=True), h5py.HardLink):
                 raise ValueError(f"{name!r} is a link")
             source = file[name]
             if not isinstance(source, h5py.Dataset):
                 raise ValueError(f"{name!r} is a group")
-            if _bare_dimension(source):
+            label = source.attrs.get("NAME", b"")
+            if source.is_scale and isinstance(label, bytes) and label.startswith(_BARE):
                 continue
             values, attributes = _decode_values(source), _decode_attributes(source)
             if source.is_scale:
                 coordinates[name] = Variable((name,), values, attributes)
             else:
-                data[name] = Variable(_decode_dims(source), values, attributes)
+                dims = [scale[0].name for scale in source.dims]
+                if None in dims:
+                    raise ValueError(f"{name!r} has a dimension without a name")
+                data[name] = Variable(tuple(dim.lstrip("/") for dim in dims), values, attributes)
         return Results({**data, **coordinates}, _decode_attributes(file))
-
-
-def _bare_dimension(source: h5py.Dataset) -> bool:
-    label = source.attrs.get("NAME", b"")
-    return bool(
-        source.is_scale and isinstance(label, bytes) and label.startswith(b"This is a netCDF")
-    )
-
-
-def _decode_dims(source: h5py.Dataset) -> tuple[str, ...]:
-    names = [scale[0].name for scale in source.dims]
-    if None in names:
-        raise ValueError(f"{source.name!r} has a dimension without a name")
-    return tuple(name.lstrip("/") for name in names)
 
 
 def _decode_values(source: h5py.Dataset) -> np.ndarray:

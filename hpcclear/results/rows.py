@@ -51,11 +51,6 @@ class FileVariable(NamedTuple):
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
     codes: FlagCodes | None = None  # of a flag
-    label: str = ""  # short words, where the name is none; see `in_words`
-
-    def in_words(self, name: str) -> str:
-        """What a variable of this name is called on an axis, without its unit: "contact force"."""
-        return self.label or name.replace("_", " ")
 
     def unit(self, objective: str, rate: str = "that of the rate") -> str:
         """The unit in a study whose objective has the unit `objective`, and what is made of its rate the unit `rate`."""
@@ -115,16 +110,14 @@ class ResultKind:
     def required(self) -> set[str]:
         """Data variables that every file has."""
         asked = {*ON_REQUEST, *JUDGED, "label"}
-        return {
-            n for n, row in self.data.items() if (n not in asked if self.whole else row.required)
-        }
+        if self.whole:
+            return self.data.keys() - asked
+        return {name for name, row in self.data.items() if row.required}
 
 
-def number(
-    dims: Dims, units: str, long_name: str, label: str = "", *, required: bool = False
-) -> FileVariable:
+def number(dims: Dims, units: str, long_name: str, *, required: bool = False) -> FileVariable:
     """A number of double precision."""
-    return FileVariable(dims, units, long_name, "f8", required, label=label)
+    return FileVariable(dims, units, long_name, "f8", required)
 
 
 def count(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
@@ -165,29 +158,20 @@ def outcome(*per_sample: str) -> FileVariables:
 
 
 def estimate(
-    name: str,
-    dims: Dims,
-    units: str,
-    words: str,
-    true: str = "",
-    level: str = "",
-    *,
-    required: bool = False,
-) -> FileVariables:
+    name: str, dims: Dims, units: str, words: str, true: str = "", level: str = "", *, required: bool = False
+) -> FileVariables:  # fmt: skip
     """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper.
 
     `required`: the number itself."""
-    ends = {
-        f"{name}_{end}": number(
-            dims, units, f"{words}: {end} end of its {level}confidence interval"
-        )
-        for end in ("lower", "upper")
-    }
-    return {f"{name}{true}": number(dims, units, words, required=required)} | ends
+    found = {f"{name}{true}": number(dims, units, words, required=required)}
+    for end in ("lower", "upper"):
+        of_end = f"{words}: {end} end of its {level}confidence interval"
+        found[f"{name}_{end}"] = number(dims, units, of_end)
+    return found
 
 
 def with_error(
-    name: str, dims: Dims, units: str, words: str, *, required: bool = False
+    name: str, dims: Dims, units: str, words: str, required: bool = False
 ) -> FileVariables:
     """A number, `required` or not, and its standard error as NAME_error."""
     error = number(dims, units, f"standard error of {name}")

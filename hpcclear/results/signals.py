@@ -15,7 +15,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.results.content import Results, Variable
-from hpcclear.results.names import KINDS
 
 
 @dataclass(frozen=True)
@@ -85,20 +84,17 @@ def is_counted(name: str) -> bool:
 
 def signals_in(response: Results) -> dict[str, Signal]:
     """Return every signal of a response (kind ``response``) by its name."""
-    time, table = response["time"].to_numpy(), KINDS["response"].data
+    time = response["time"].to_numpy()
     found: dict[str, Signal] = {}
 
-    def add(
-        name: str, label: str, variable: Variable, derived: DerivedSignal | None = None
-    ) -> None:
+    def add(name: str, label: str, variable: Variable, derived: DerivedSignal | None) -> None:
         others = [dim for dim in variable.dims if dim != "time"]
         if "time" not in variable.dims or len(others) > 1:
             return
         unit = str(variable.attrs["units"]) if derived is None else derived.unit
         places = variable.labels[others[0]] if others else [""]
-        for place, series in zip(
-            places, variable.values.reshape(len(time), len(places)).T, strict=True
-        ):
+        columns = variable.values.reshape(len(time), len(places)).T
+        for place, series in zip(places, columns, strict=True):
             key = f"{name} {place}" if others else name
             words = f"{label} of {place}" if others else label
             found[key] = Signal(key, words, unit, time, series, derived)
@@ -106,7 +102,7 @@ def signals_in(response: Results) -> dict[str, Signal]:
                 found[name] = found[key]
 
     for name, variable in response.data_vars.items():
-        add(name, table[name].in_words(name), variable)
+        add(name, name.replace("_", " "), variable, None)
     for name, derived in DERIVED.items():
         if derived.source in response:
             add(name, derived.label, response[derived.source], derived)
