@@ -151,10 +151,13 @@ MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
 def in_si(case: object, objective: object, key: str) -> object:
-    """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
+    """A case's row, of a list one with these random inputs, with objectives for their words, and `limit` and `most` in SI by
+    the unit of the study's objective.
 
     An error for validators where a limit is no number of that unit; its key begins with `key`.
     """
+    if isinstance(case, (list, tuple)):
+        return {"random": case}
     if not isinstance(case, Mapping):
         return case
     try:

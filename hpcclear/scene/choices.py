@@ -11,10 +11,9 @@ the reciprocal of the square; F. H. Speckhart, "Calculation of tolerance based o
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import nearest
@@ -44,14 +43,13 @@ class CatalogueRow(Table):
     entries: dict[str, float | str]
     """Values by path: numbers of the scene, SI, and entries of random inputs."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _gathered(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """Paths beside the name, as a file has them, as `entries` in SI."""
-        if not isinstance(data, Mapping) or "entries" in data:
-            return data
-        kept = {key: data[key] for key in ("name", "cost") if key in data}
-        rest = {key: value for key, value in data.items() if key not in kept}
+        if "entries" in row:
+            return row
+        kept = {key: row[key] for key in ("name", "cost") if key in row}
+        rest = {key: value for key, value in row.items() if key not in kept}
         entries = dict(flatten(rest))  # quoted, or as nested tables
         for path, value in entries.items():
             if path.startswith(OF_RANDOM):
@@ -151,9 +149,7 @@ class Cost(Table):
             return
         needed = {"reciprocal": ("at", "cost"), "exponential": ("at", "cost", "scale")}
         if self.law is None:
-            remedy = (
-                'Write law = "reciprocal" or "exponential", or a list with a cost for each option'
-            )
+            remedy = 'Write law = "reciprocal" or "exponential", or a list with each option\'s cost'
             raise invalid("the law of the cost is missing", remedy, "law")
         for key in needed[self.law]:
             if getattr(self, key) is None:

@@ -33,11 +33,7 @@ _MOMENT = re.compile(
     r"\s*(?P<zone>z|utc|gmt|[+-]\d\d:?(?:\d\d)?)?)?",
     re.IGNORECASE,
 )
-_ORDERS = {
-    "day, month, year": (2, 1, 0),
-    "month, day, year": (2, 0, 1),
-    "year, month, day": (0, 1, 2),
-}
+_ORDERS = {"day, month, year": "210", "month, day, year": "201", "year, month, day": "012"}
 """Where year, month and day stand."""
 
 Moment = tuple[int | None, int, float, bool]
@@ -47,12 +43,8 @@ Moment = tuple[int | None, int, float, bool]
 def is_clock(cell: str) -> bool:
     """Whether a cell is a clock time or a date."""
     text = cell.strip()
-    return (
-        (":" in text or len(text) > 7)
-        and len(text) < 60
-        and bool(text)
-        and _MOMENT.fullmatch(text) is not None
-    )
+    usual = 0 < len(text) < 60 and (":" in text or len(text) > 7)
+    return usual and _MOMENT.fullmatch(text) is not None
 
 
 def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
@@ -111,12 +103,8 @@ def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> M
     rest = found["fraction"] or found["rest"]
     fraction = float("0." + rest[1:]) if rest else 0.0
     zone = found["zone"]
-    return (
-        day,
-        3600 * hours + 60 * minutes + whole - _offset(zone or ""),
-        fraction,
-        zone is not None,
-    )
+    since = 3600 * hours + 60 * minutes + whole - _offset(zone or "")
+    return day, since, fraction, zone is not None
 
 
 def _offset(zone: str) -> int:
@@ -130,47 +118,39 @@ def _offset(zone: str) -> int:
 @lru_cache(4096)
 def _day(text: str, order: str) -> int | None:
     """Number of a day, None if there is no such one."""
-    parts = (
-        re.findall(r"[^\W_]+", text) if not text.isdecimal() else [text[:4], text[4:6], text[6:]]
-    )
+    parts = re.findall(r"[^\W_]+", text)
+    if text.isdecimal():
+        parts = [text[:4], text[4:6], text[6:]]
     month = next((one for one in parts if one.isalpha()), None)
     if month is not None:
         day, year = (one for one in parts if one != month)
-        number = _MONTHS.get(month[:3].lower(), 0)
+        number = str(_MONTHS.get(month[:3].lower(), 0))
     else:
         places = _ORDERS["year, month, day" if len(parts[0]) == 4 else order]
-        year, number, day = parts[places[0]], int(parts[places[1]]), parts[places[2]]
+        year, number, day = (parts[int(place)] for place in places)
     try:
-        return datetime.date(int(year) + 2000 * (len(year) == 2), number, int(day)).toordinal()
+        century = 2000 * (len(year) == 2)
+        return datetime.date(int(year) + century, int(number), int(day)).toordinal()
     except ValueError:
         return None
 
 
 def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
     """The order of day, month and year that makes each cell a date; points stand between day, month and year."""
-    open_ = [
-        (row, found)
-        for row, cell in enumerate(cells)
-        if (found := _MOMENT.fullmatch(cell.strip())) and found["mark"] in ("/", "-")
-    ]
-    orders = (
-        list(_ORDERS) if any(len(found["date"]) < 9 for _, found in open_) else list(_ORDERS)[:2]
-    )
+    every = ((row, _MOMENT.fullmatch(cell.strip())) for row, cell in enumerate(cells))
+    open_ = {row: one["date"] for row, one in every if one and one["mark"] in ("/", "-")}
+    orders = list(_ORDERS)
+    if not any(len(date) < 9 for date in open_.values()):
+        orders.pop()  # a year of four digits stands at the end
     if not open_:
         return orders[0]
-    fits = [
-        order
-        for order in orders
-        if all(_day(found["date"], order) is not None for _, found in open_)
-    ]
-    row, found = open_[0]
+    fits = [one for one in orders if None not in (_day(date, one) for date in open_.values())]
     if len(fits) > 1:
-        readings = [
-            datetime.date.fromordinal(_day(found["date"], one) or 1).isoformat() for one in fits
-        ]
-        named = [f"{reading} ({order})" for reading, order in zip(readings, fits, strict=True)]
+        row, date = next(iter(open_.items()))
+        days = [datetime.date.fromordinal(_day(date, one) or 1).isoformat() for one in fits]
+        named = [f"{day} ({order})" for day, order in zip(days, fits, strict=True)]
         reason = f"may be {' or '.join(named)}"
-        raise InputError(where(row), cells[row], reason, f"Write dates as {readings[0]}")
+        raise InputError(where(row), cells[row], reason, f"Write dates as {days[0]}")
     return (fits or orders)[0]
 
 

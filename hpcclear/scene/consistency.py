@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
@@ -17,6 +17,27 @@ from hpcclear.scene.slider_crank import JOINTS
 from hpcclear.scene.tables import SceneTables
 
 
+def _clearance_of_open_joints(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Without a path of its own, C drives the clearances there are."""
+    try:
+        if data["mechanism"].get("kind") == "planar":
+            key, rows = "mechanism.joints", data["mechanism"]["joints"]
+        else:
+            key, rows = "joints", {name: data["joints"][name] for name in JOINTS}
+        kinds = {n: row.get("kind") or rows[row["like"]]["kind"] for n, row in rows.items()}
+        tables = {name: dict(data["study"].get(name, {})) for name in ("variables", "random")}
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return data  # the models below say what is wrong with it
+    paths = [f"{key}.{name}.clearance" for name, kind in kinds.items() if kind == "clearance"]
+    if not paths or tuple(paths) == SHORT_NAMES["C"]:
+        return data
+    for table, rows in tables.items():
+        row = rows.get("C")
+        if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
+            data = replace(data, f"study.{table}.C", {**row, "paths": paths})
+    return data
+
+
 class ConsistentTables(SceneTables):
     """The tables of a scene file, each fitting the others."""
 
@@ -27,13 +48,13 @@ class ConsistentTables(SceneTables):
             raise invalid("true or false is not a version", "Write format_version = 1")
         return value
 
-    @model_validator(mode="before")
     @classmethod
-    def _kind_of_mechanism(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
-        if not isinstance(data, Mapping) or not isinstance(data.get("mechanism"), Mapping):
+        data = _clearance_of_open_joints(row)
+        mechanism = data.get("mechanism")
+        if not isinstance(mechanism, Mapping):
             return data
-        mechanism = data["mechanism"]
         data = with_shares(with_fits_of_joints(data))
         kind = mechanism.get("kind", "slider-crank")
         for table in ("drive", "joints"):
@@ -41,28 +62,6 @@ class ConsistentTables(SceneTables):
                 own = "drives" if table == "drive" else table
                 raise invalid("belongs to a slider-crank", f"Write [mechanism.{own}.NAME]", table)
         return {**data, "mechanism": {"kind": kind, **mechanism}}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _clearance_of_open_joints(cls, data: Any) -> Any:
-        """Without a path of its own, C drives the clearances there are."""
-        try:
-            if data["mechanism"].get("kind") == "planar":
-                key, rows = "mechanism.joints", data["mechanism"]["joints"]
-            else:
-                key, rows = "joints", {name: data["joints"][name] for name in JOINTS}
-            kinds = {n: row.get("kind") or rows[row["like"]]["kind"] for n, row in rows.items()}
-            tables = {name: dict(data["study"].get(name, {})) for name in ("variables", "random")}
-        except (AttributeError, KeyError, TypeError, ValueError):
-            return data  # the models below say what is wrong with it
-        paths = [f"{key}.{name}.clearance" for name, kind in kinds.items() if kind == "clearance"]
-        if not paths or tuple(paths) == SHORT_NAMES["C"]:
-            return data
-        for table, rows in tables.items():
-            row = rows.get("C")
-            if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
-                data = replace(data, f"study.{table}.C", {**row, "paths": paths})
-        return data
 
     def _check(self) -> None:
         self._check_mechanism()
@@ -120,9 +119,8 @@ class ConsistentTables(SceneTables):
             for name in clearance:
                 if self.clearance_joint(name).length_path is None:
                     entry, part = self.clearance_joint(name).long_entry
-                    reason = (
-                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}'
-                    )
+                    geometry = f'the contact geometry "{contact.geometry}"'
+                    reason = f"{geometry} needs the {entry} of the {part}"
                     remedy = f'Add {entry} = "20 mm" or so to the joint'
                     raise invalid(reason, remedy, f"{self.joint_key(name)}.{entry}")
         if clearance and contact is None:

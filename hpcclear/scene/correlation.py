@@ -68,9 +68,8 @@ class Correlation(Table):
         joined = np.array(self.matrix)[np.ix_(*2 * [[self.inputs.index(n) for n in own]])] != 0.0
         for _ in own:  # every step doubles the length of the chains
             joined = joined @ joined
-        blocks = {
-            name: frozenset(np.flatnonzero(row)) for name, row in zip(own, joined, strict=True)
-        }
+        members = (frozenset(np.flatnonzero(row)) for row in joined)
+        blocks = dict(zip(own, members, strict=True))
         several = [blocks[name] for name in names if len(blocks.get(name, ())) > 1]
         order = list(dict.fromkeys(several))
         return [order.index(blocks[n]) + 1 if blocks.get(n) in order else 0 for n in names]

@@ -45,9 +45,8 @@ class Pairs(Converted):
             raise invalid(reason, "Load a scene with it, or give pairs")
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
-        remedy = (
-            f"Write {f'a number in {self.unit}, or ' if self.constant else ''}pairs {self._shown}"
-        )
+        number = f"a number in {self.unit}, or " if self.constant else ""
+        remedy = f"Write {number}pairs {self._shown}"
         if not isinstance(value, (list, tuple)) or not self.fewest <= len(value) <= self.most:
             raise invalid(f"a table of {self.fewest} to {self.most} pairs is expected here", remedy)
         if any(not isinstance(row, (list, tuple)) or len(row) != 2 for row in value):

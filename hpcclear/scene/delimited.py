@@ -130,11 +130,8 @@ def rows_of(path: Path, what: str, data: bytes) -> tuple[Rows, str, str]:
 
 def _rows(path: Path, what: str, lines: Lines, separator: str) -> Rows:
     if separator.isspace() and separator != "\t":  # runs of them stand between columns
-        runs = _between(separator)
-        lines = [
-            (number, runs.sub("\x1f", re.sub(r"\s+(?=[\[(])", "", line.strip())))
-            for number, line in lines
-        ]
+        runs, bracket = _between(separator), re.compile(r"\s+(?=[\[(])")
+        lines = [(n, runs.sub("\x1f", bracket.sub("", line.strip()))) for n, line in lines]
         separator = "\x1f"
     try:
         cut = csv.reader(

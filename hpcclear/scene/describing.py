@@ -45,9 +45,8 @@ def implausible(scene: SceneTables) -> Iterator[str]:
                 yield f"{path} = {scene.shown(path)} is {what}; {remedy.format(number)}"
     yield from _bodies(scene)
     yield from _joints(scene)
-    if scene.numerics.beta == 0.0 and (
-        scene.template is None or scene.numerics.formulation == "baumgarte"
-    ):
+    loops = scene.template is None or scene.numerics.formulation == "baumgarte"
+    if loops and scene.numerics.beta == 0.0:
         yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
 
 
@@ -65,21 +64,19 @@ def _drive(scene: SceneTables) -> Iterator[str]:
 
 
 def _bodies(scene: SceneTables) -> Iterator[str]:
-    bodies = [
-        (scene.path_in_scene(f"mechanism.bodies.{one.name}"), one) for one in scene.linkage.bodies
-    ]
-    bars = [(key, bar, bar.length) for key, bar in bodies if bar.length is not None]
-    for key, bar, length in bars:
-        if (own := bar.own_inertia) > 100.0 * bar.mass * length**2:
+    bodies = {scene.path_in_scene(f"mechanism.bodies.{b.name}"): b for b in scene.linkage.bodies}
+    lengths = {key: body.length for key, body in bodies.items() if body.length is not None}
+    for key, length in lengths.items():
+        own, share = bodies[key].own_inertia, bodies[key].own_inertia / bodies[key].mass / length**2
+        if share > 100.0:
             yield (
-                f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {own / (bar.mass * length**2):.2g} times mass times "
+                f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {share:.2g} times mass times "
                 "length squared; check the unit, or give a flywheel as flywheel_inertia of a drive"
             )
-    points = [scene.linkage.ground.points, *(body.points for _, body in bodies)]
-    places = [one for own in points for one in own]
-    sizes = [*(length for _, _, length in bars), *(math.hypot(one.x, one.y) for one in places)]
+    places = [*scene.linkage.ground.points, *(one for b in bodies.values() for one in b.points)]
+    sizes = [*lengths.values(), *(math.hypot(one.x, one.y) for one in places)]
     heaviest = 5.0 * STEEL * (max(sizes, default=0.0) or math.inf) ** 3
-    for key, body in bodies:
+    for key, body in bodies.items():
         if body.mass > heaviest:
             yield (
                 f"{key}.mass = {scene.shown(f'{key}.mass')} is more than five steel cubes as long as the mechanism "
@@ -154,9 +151,10 @@ def cited_by(scene: SceneTables) -> str:
     expected = {f"mechanism.{name}": value for name, value in _LENGTHS.items()}
     for joint in scene.clearance_joints():
         expected |= {f"joints.{joint}.{name}": value for name, value in _JOINT.items()}
-    numbers = {path: scene.number(path) for path in scene.numeric_paths() if path in expected}
-    same = (math.isclose(numbers[path], expected[path], rel_tol=1e-9) for path in numbers)
-    return TITLE if len(numbers) == len(expected) > len(_LENGTHS) and all(same) else ""
+    known = len(expected) > len(_LENGTHS) and expected.keys() <= {*scene.numeric_paths()}
+    numbers = expected.items() if known else ()
+    same = all(math.isclose(scene.number(path), one, rel_tol=1e-9) for path, one in numbers)
+    return TITLE if known and same else ""
 
 
 def effects_on(scene: SceneTables) -> Iterator[str]:
@@ -235,10 +233,9 @@ def warnings(scene: SceneTables) -> Iterator[str]:
             )
     for variable in scene.study.variables if scene.study is not None else ():
         own = [scene.number(path) for path in variable.paths]
-        ends = [scene.shown(variable.paths[0], end) for end in variable.range or () if own]
-        if variable.range is not None and not all(
-            variable.range[0] <= value <= variable.range[1] for value in own
-        ):
+        low, high = variable.range or (-math.inf, math.inf)
+        if not all(low <= value <= high for value in own):
+            ends = [scene.shown(variable.paths[0], end) for end in (low, high)]
             yield (
                 f"study.variables.{variable.name} runs from {' to '.join(ends)}, and the scene's own value "
                 f"{scene.shown(variable.paths[0])} lies outside"
@@ -269,10 +266,11 @@ def _entry(scene: SceneTables, key: str, entries: Mapping[str, object]) -> str:
 def differences(first: SceneTables, second: SceneTables) -> list[str]:
     """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
     equal."""
-    ours, theirs = (
-        {k: f"SHA-256 {digest(v)}" if k.startswith("plugins.files.") else v for k, v in entries}
-        for entries in (flatten(inputs_of(one.resolved())) for one in (first, second))
-    )
+    ours, theirs = (dict(flatten(inputs_of(one.resolved()))) for one in (first, second))
+    for entries in (ours, theirs):
+        for key in entries:
+            if key.startswith("plugins.files."):
+                entries[key] = f"SHA-256 {digest(entries[key])}"
     lines = [
         f"{key}: {_entry(first, key, ours)} -> {_entry(second, key, theirs)}"
         for key in {**ours, **theirs}

@@ -88,10 +88,9 @@ def _bounds(
     # The random inputs move I, m and L separately; r = 12 I/(m L^2) is monotonic in each of them
     # and in the design, so its extremes are at corners.
     link = variable.paths[0].rpartition(".")[0]
-    masses, lengths = (_span(scene, f"{link}.{part}", names) for part in ("mass", "length"))
-    mass_ends, length_ends = (
-        reach.get(f"{link}.{part}", (0.0, 0.0)) for part in ("mass", "length")
-    )
+    parts = [f"{link}.{part}" for part in ("mass", "length")]
+    masses, lengths = (_span(scene, path, names) for path in parts)
+    mass_ends, length_ends = (reach.get(path, (0.0, 0.0)) for path in parts)
     ratios = []
     for mass, length in itertools.product(masses, lengths):
         unit = mass * length**2 / 12

@@ -174,9 +174,7 @@ class PlanarTable(Driving):
             raise invalid(reason, "Sort the rows by time, the first at 0", "angle")
         gained = self.angle[-1][1] - self.angle[0][1]
         if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
-            reason = (
-                f"the last angle is {gained:.6g} rad from the first, but the motion repeats there"
-            )
+            reason = f"the last angle is {gained:.6g} rad from the first, where the motion repeats"
             remedy = "End it where it began, or a full turn further on or back"
             raise invalid(reason, remedy, "angle")
 

@@ -1,9 +1,9 @@
 """What acts on the mechanism: contact, friction, gravity and loads, as in the scene file."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
 from hpcclear.base.pieces import Rows
 from hpcclear.laws.declared import ContactLaw, FrictionLaw
@@ -113,15 +113,12 @@ class EffectTables(Table):
                 return None if parameter is None else quantity_of(parameter).unit
         return None
 
-    @model_validator(mode="before")
     @classmethod
-    def _none_is_off(cls, data: object) -> object:
-        if not isinstance(data, Mapping):
-            return data
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         for key in ("friction", "guide_friction"):
-            if isinstance(data.get(key), str) and data[key] != "none":
+            if isinstance(row.get(key), str) and row[key] != "none":
                 also = ' with law = "coulomb"' if key == "friction" else ""
                 remedy = f'Write "none", or a table such as {{ coefficient = 0.01 }}{also}'
-                raise invalid('a table is expected here, or "none"', remedy, key, data[key])
+                raise invalid('a table is expected here, or "none"', remedy, key, row[key])
         words = ("contact", "friction", "slider_load", "guide_friction")
-        return {key: value for key, value in data.items() if not (key in words and value == "none")}
+        return {key: value for key, value in row.items() if not (key in words and value == "none")}

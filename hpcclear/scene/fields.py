@@ -6,14 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, WithJsonSchema, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
@@ -64,6 +57,8 @@ def hint(word: object) -> str:
 
 Content = dict[str, Any]
 """Tables as a file has them: numbers, texts, lists and tables by their names; whatever stands there until it is valid."""
+Tables = Mapping[str, object]
+"""The same, to be read."""
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
@@ -105,11 +100,19 @@ class Table(BaseModel):
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Keys that a user might expect here and that belong to another kind: reason and remedy."""
 
+    @classmethod
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Entries of this class, of a table as a file has it; an error for validators where it makes none."""
+        return row
+
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: object) -> object:
+        if isinstance(data, Table):
+            return data
+        data = checked_table(cls._of_file(data) if isinstance(data, Mapping) else data)
         known = tuple(cls.model_fields)
-        for key in () if isinstance(data, Table) else checked_table(data):
+        for key in data:
             if key not in known:
                 unknown = "is not a known key", hint(key) + nearest(key, known)
                 reason, remedy = cls.elsewhere.get(key, unknown)
@@ -156,14 +159,10 @@ class Converted:
         """What a file may have there."""
         raise NotImplementedError
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.convert)
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> JsonSchemaValue:
         return self.json_schema()
 
 
@@ -246,13 +245,9 @@ class Quantity(Converted):
         """The bounds in words, in a unit; by default that of the entry."""
         unit = self.unit if unit is None else unit
         times = float(factor(unit, self.unit)) if unit != self.unit else 1.0
-        words = {
-            "above": self.above,
-            "at least": self.least,
-            "below": self.below,
-            "at most": self.most,
-        }
-        parts = [f"{word} {one / times:.6g}" for word, one in words.items() if one is not None]
+        limits = {"above": self.above, "at least": self.least, "below": self.below}
+        limits["at most"] = self.most
+        parts = [f"{word} {one / times:.6g}" for word, one in limits.items() if one is not None]
         parts += ["other than 0"] * self.nonzero
         return " and ".join(parts) + (f" {unit}" if unit else "")
 
@@ -265,10 +260,8 @@ class Quantity(Converted):
         """A number within the bounds, or a text with a unit."""
         words = ("exclusiveMinimum", "exclusiveMaximum", "minimum", "maximum")
         bounds = zip(words, (self.above, self.below, self.least, self.most), strict=True)
-        number: JsonSchemaValue = {
-            "type": "number",
-            **{k: one for k, one in bounds if one is not None},
-        }
+        number: JsonSchemaValue = {"type": "number"}
+        number |= {word: one for word, one in bounds if one is not None}
         if self.nonzero:
             number["not"] = {"const": 0}
         if not self.unit:
@@ -331,14 +324,10 @@ class NamedRows:
             made.append({"name": name, **row})
         return made
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.rows, handler(source))
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> JsonSchemaValue:
         return {"type": "object", "additionalProperties": handler(schema)["items"]}
 
 

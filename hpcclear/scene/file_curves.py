@@ -14,7 +14,7 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
-from hpcclear.scene.fields import LONGEST_CURVE, Content, PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, Tables, invalid
 from hpcclear.scene.paths import curves, files_named, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 from hpcclear.scene.validation import validated
@@ -70,9 +70,8 @@ class FileCurve(Table):
         given = [kind for kind in _VALUES if getattr(self, kind) is not None]
         if len(given) > 1:
             raise invalid(f"stands beside {given[0]}", "Keep one of them", given[1])
-        piston = [
-            key for key in ("bore", "area", "ambient", "pushes") if getattr(self, key) is not None
-        ]
+        of_piston = ("bore", "area", "ambient", "pushes")
+        piston = [key for key in of_piston if getattr(self, key) is not None]
         if given not in ([], ["pressure"]) and piston:
             reason = "belongs to a pressure"
             raise invalid(reason, f"Remove it, or write pressure in place of {given[0]}", piston[0])
@@ -88,9 +87,11 @@ class FileCurve(Table):
         return self.area if self.bore is None else math.pi / 4 * self.bore**2
 
 
-def pairs_of(
-    curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
-) -> tuple[list[list[float]], str]:
+Read = tuple[list[list[float]], str]
+"""Pairs, and what was read in words."""
+
+
+def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1) -> Read:
     """The pairs of a curve against the crank angle, rad and `unit` (N or N*m), rising, and what was read in words.
 
     `key`: the entry that it stands for; `turns`: of a revolution of the scene, a file of one turn is repeated as often.
@@ -114,9 +115,7 @@ def pairs_of(
     return [[float(a), float(v)] for a, v in zip(angles, values, strict=True)], shown
 
 
-def against_time(
-    curve: FileCurve, folder: Path, unit: str, key: str
-) -> tuple[list[list[float]], str]:
+def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
     """The pairs of a curve against the time, s and `unit`, as `pairs_of` does; the motion of a drive begins at 0 s."""
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
     kind = next(name for name, own in {**_VALUES, **_MOTIONS}.items() if own == unit)
@@ -152,9 +151,8 @@ def _column(
     """The column of a kind, and its numbers in SI, shape (n,)."""
     key = f"{key}.{kind}"
     # such as "bar", "cylinder 1" or "cylinder 1 [bar]"
-    name, unit = (
-        ("", given or "") if given is None or fits(given, target) else parsed_heading(given)
-    )
+    bare = given is None or fits(given, target)
+    name, unit = ("", given or "") if bare else parsed_heading(given or "")
     column = sheet.column(name, key) if name else sheet.likely(kind, target, key, taken)
     if unit and column.unit and _size(unit, target, key) != _size(column.unit, target, key):
         reason = f"the heading {column.heading!r} has the unit {column.unit}"
@@ -198,9 +196,8 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
     if angles[-1] < angles[0] and (np.diff(angles) < 0).sum() > len(angles) / 2:
         angles, values = angles[::-1], values[::-1]
     falls = np.flatnonzero(np.diff(angles) <= 0)
-    if (
-        len(falls) == 1 and angles[-1] <= angles[0] + 1e-9
-    ):  # begins within a revolution: 180 to 359, 0 to 179
+    # begins within a revolution: 180 to 359, 0 to 179
+    if len(falls) == 1 and angles[-1] <= angles[0] + 1e-9:
         period = TURN * max(1, math.ceil((angles.max() - angles.min()) / TURN - 1e-6))
         angles = angles + period * (np.arange(len(angles)) > falls[0])
         falls = np.flatnonzero(np.diff(angles) <= 0)
@@ -224,24 +221,19 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
         raise InputError(*where, reason, "Give the whole revolution")
     if gaps[-1] < 1e-6 * TURN:  # the end point repeats the first
         if abs(values[-1] - values[0]) > SEAM * np.ptp(values):
-            reason = (
-                f"ends at {values[-1]:.6g} and begins at {values[0]:.6g} (SI), at the same angle"
-            )
+            ends = f"ends at {values[-1]:.6g} and begins at {values[0]:.6g}"
+            reason = f"{ends} (SI), at the same angle"
             raise InputError(*where, reason, "Give a curve that repeats, or leave the last row out")
         values = np.append((values[0] + values[-1]) / 2, values[1:-1])
         angles = angles[:-1]
     if len(angles) > LONGEST_CURVE - 1:
         fine = angles[0] + FINEST * np.arange(round(turns * TURN / FINEST))
-        values = np.interp(
-            fine, np.append(angles, angles[0] + turns * TURN), np.append(values, values[0])
-        )
-        angles = fine
+        wide = np.append(angles, angles[0] + turns * TURN)
+        angles, values = fine, np.interp(fine, wide, np.append(values, values[0]))
     return angles, values
 
 
-def with_values(
-    content: Mapping[str, object], folder: Path
-) -> tuple[Mapping[str, object], list[Reading]]:
+def with_values(content: Tables, folder: Path) -> tuple[Tables, list[Reading]]:
     """The parsed content of a scene with what files in `folder` hold in the place of their names, and how each was read.
 
     Raises InputError if a file cannot be read, has no such column or a cell in it is no number.
@@ -263,9 +255,7 @@ def with_values(
     return content, read_as
 
 
-def _with_values(
-    row: Mapping[str, object], file: str, key: str, folder: Path
-) -> tuple[Content, str]:
+def _with_values(row: Tables, file: str, key: str, folder: Path) -> tuple[Tables, str]:
     column = row.get("column")
     if "values" in row:
         raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
@@ -285,9 +275,7 @@ def _with_values(
     return {**kept, "values": values}, f"{sheet.found}, {len(values)} values of {chosen.heading}"
 
 
-def _curve(
-    content: Mapping[str, object], row: Mapping[str, object], key: str, folder: Path
-) -> tuple[list[list[float]], str]:
+def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
     parts = key.split(".")
     general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
     if general not in curves():
@@ -302,7 +290,7 @@ def _curve(
     return pairs_of(curve, folder, unit, key, _turns(content))
 
 
-def _turns(content: Mapping[str, object]) -> int:
+def _turns(content: Tables) -> int:
     """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
     mechanism = content.get("mechanism")
     drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None

@@ -10,8 +10,6 @@ from bisect import bisect_left
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import model_validator
-
 from hpcclear.base import tolerances
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
@@ -92,9 +90,8 @@ class Fit(NamedTuple):
     @property
     def clearances(self) -> SizeLimits:
         """Least and largest radial clearance, m; below 0 where both may be tight."""
-        return SizeLimits(
-            (self.hole[0] - self.shaft[1]) / 2e6, (self.hole[1] - self.shaft[0]) / 2e6
-        )
+        (low, high), (least, most) = self.hole, self.shaft
+        return SizeLimits((low - most) / 2e6, (high - least) / 2e6)
 
     @property
     def clearance(self) -> float:
@@ -129,9 +126,8 @@ def fit_of(text: object) -> Fit:
     shaft = _limits(size, found["shaft"], int(found["shaft_grade"]))
     low, high = hole[0] - shaft[1], hole[1] - shaft[0]
     if low < 0.0:
-        reason = (
-            f"leaves {low:.4g} to {high:.4g} um between both diameters: no clearance for a joint"
-        )
+        left = f"{low:.4g} to {high:.4g} um between both diameters"
+        reason = f"leaves {left}: no clearance for a joint"
         raise invalid(reason, "Choose a looser fit such as H7/g6, or a joint without clearance")
     return Fit(size, hole, shaft)
 
@@ -185,12 +181,10 @@ class Tolerance(Table):
     inspected: bool = True
     """Whether inspection rejects parts outside the limits of size."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _in_metres(cls, data: object) -> object:
-        if not isinstance(data, Mapping) or "range" not in data:
-            return data
-        return {**data, "range": _DIAMETER.range(data["range"], "range")}
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+        own = {"range": _DIAMETER.range(row["range"], "range")} if "range" in row else {}
+        return {**row, **own}
 
     def _check(self) -> None:
         if self.distribution == "uniform" and (self.cp, self.cpk, self.towards) != (1, None, None):
@@ -216,11 +210,8 @@ def law_of(entries: Content) -> tolerances.FitClearance:
     """The distribution of a radial clearance by the entries of a random input; raises an error for validators."""
     parts = []
     fit = None if entries.get("fit") is None else fit_of(entries["fit"])
-    for name, limits in (
-        ("bore", fit and fit.diameters("hole")),
-        ("pin", fit and fit.diameters("shaft")),
-    ):
-        tolerance = Tolerance(**entries.get(name, {}))
+    for name, part in (("bore", "hole"), ("pin", "shaft")):
+        tolerance, limits = Tolerance(**entries.get(name, {})), fit and fit.diameters(part)
         if tolerance.range is None and limits is None:
             raise invalid(
                 "its limits of size are not known",
@@ -239,10 +230,8 @@ def law_of(entries: Content) -> tolerances.FitClearance:
     return law
 
 
-def with_clearance(joint: object) -> Any:
+def with_clearance(joint: Mapping[str, Any]) -> Content:
     """Entries of a joint in the file with `clearance` and `bearing_radius` in place of a fit or a diametral clearance."""
-    if not isinstance(joint, Mapping):
-        return joint
     for key in ("fit", "diametral_clearance"):
         beside = [other for other in INSTEAD[key] if other in joint]
         if key in joint and beside:

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping
 
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Content, Quantity, invalid
+from hpcclear.scene.fields import Content, Quantity, Tables, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
 from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
 
 
-def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, object]:
+def with_fits_of_joints(content: Tables) -> Tables:
     """The content of a file whose random inputs with distribution "fit" say which: that of the joints that they drive."""
     for name, row, joints in _rows_of_fits(content):
         if "fit" in row or not joints:
@@ -21,7 +21,7 @@ def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, object]:
     return content
 
 
-def with_shares(content: Mapping[str, object]) -> Mapping[str, object]:
+def with_shares(content: Tables) -> Tables:
     """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about;
     where the study varies that, it stays a share, and the input is `relative`. An error for validators if the number is not
     there.
@@ -68,20 +68,18 @@ def is_share(entry: object) -> bool:
 def note_share(share: str, unit: str, about: str) -> None:
     """Note how a percentage is read where the number itself has no unit, so that it might be one of its own."""
     if not unit:
-        note(
-            share,
-            f"{share.strip()} of {about}; for a width of that many hundredths write a plain number",
-        )
+        instead = "for a width of that many hundredths write a plain number"
+        note(share, f"{share.strip()} of {about}; {instead}")
 
 
-def _number(content: Mapping[str, object], path: str) -> object:
+def _number(content: Tables, path: str) -> object:
     """What a file has at a path, a clearance by its fit, too."""
     owner, _, leaf = path.rpartition(".")
     table = _at(content, owner)
     return with_clearance(table).get(leaf) if isinstance(table, Mapping) else None
 
 
-def entry_replaced(content: Mapping[str, object], path: str, value: object) -> Content:
+def entry_replaced(content: Tables, path: str, value: object) -> Content:
     """The content of a scene with an entry replaced, and without what it stands in place of: a fit takes a clearance's."""
     owner, _, leaf = path.rpartition(".")
     before = _at(content, owner)
@@ -106,8 +104,8 @@ def _at(content: object, path: str) -> object:
 
 
 def _rows_of_fits(
-    content: Mapping[str, object],
-) -> Iterator[tuple[str, Mapping[str, object], list[Mapping[str, object]]]]:
+    content: Tables,
+) -> Iterator[tuple[str, Tables, list[Tables]]]:
     """Random inputs of the distribution "fit": names, rows, and the open joints whose clearances they drive."""
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():

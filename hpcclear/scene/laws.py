@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
+from pydantic import ConfigDict, PrivateAttr, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import at
 from hpcclear.base.pieces import Rows
@@ -143,10 +142,8 @@ class LawTable(Table):
             return data
         law = cls.find(name, data)
         cls._refuse_unknown(data, law)
-        return {
-            **{k: v for k, v in data.items() if k in cls.model_fields},
-            **cls._converted(data, law),
-        }
+        own = {key: value for key, value in data.items() if key in cls.model_fields}
+        return own | cls._converted(data, law)
 
     @classmethod
     def find(cls, name: str, data: Mapping[str, object]) -> Law:
@@ -180,9 +177,7 @@ class LawTable(Table):
         if not isinstance(text, str):
             reason = "the law 'expression' needs a formula"
             raise invalid(reason, f'Add {entry} = "..."', entry, text)
-        if not isinstance(units, Mapping) or not all(
-            isinstance(one, str) for one in units.values()
-        ):
+        if not (isinstance(units, Mapping) and {*map(type, units.values())} <= {str}):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with at(entry):
             law = law_of(cls.kind, text, units)
@@ -229,9 +224,8 @@ class LawTable(Table):
             found[parameter.name] = _value(parameter, value)
             if theirs and parameter.count == 1:
                 quantity = quantity_of(parameter)
-                ENTRIES.setdefault(f"effects.{cls.kind}.{parameter.name}", {})[quantity.unit] = (
-                    quantity
-                )
+                units = ENTRIES.setdefault(f"effects.{cls.kind}.{parameter.name}", {})
+                units[quantity.unit] = quantity
         wrong = None if law.check is None else law.check(found)
         if wrong is not None:
             raise invalid(*wrong)
@@ -255,9 +249,7 @@ class LawTable(Table):
         return self.values().get(name)
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> JsonSchemaValue:
         """With the entries of all laws of this package."""
         made = handler.resolve_ref_schema(handler(schema))
         every = {one.name: one for one in _with_entries(cls.kind)}
@@ -288,9 +280,8 @@ def _curve(data: Mapping[str, object]) -> Rows | None:
 
 def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> JsonSchemaValue:
     entry = quantity_of(parameter).json_schema()
-    whose = [
-        name for name, one in every.items() if parameter.name in [p.name for p in one.parameters]
-    ]
+    own = parameter.name
+    whose = [name for name, one in every.items() if own in [p.name for p in one.parameters]]
     if parameter.count > 1:
         many = parameter.count
         entry = {"type": "array", "items": entry, "minItems": many, "maxItems": many}

@@ -52,7 +52,7 @@ def load_scene(
     if isinstance(source, Mapping):
         text, content = None, dict(source)
     else:
-        text = _read(Path(source))
+        text = _read(Path(source), "scene file", "Give the path of a TOML scene file")
         content = parse(text, str(source))
     for override in overrides:
         content = entry_replaced(content, *_override(override))
@@ -79,8 +79,8 @@ def load_scene(
     elif head or own_plugins:
         scene._text = head + tomli_w.dumps({**content, **plugins}, multiline_strings=True)
     else:
-        below = "\n\n" + tomli_w.dumps(plugins, multiline_strings=True) if plugins else ""
-        scene._text = text + below
+        below = tomli_w.dumps(plugins, multiline_strings=True)
+        scene._text = f"{text}\n\n{below}" if plugins else text
     return scene
 
 
@@ -106,9 +106,7 @@ def _beside(folder: Path, module: str) -> str | None:
     return _read(path, "Python file", "Give a plug-in in Python").replace("\r\n", "\n")
 
 
-def _read(
-    path: Path, what: str = "scene file", remedy: str = "Give the path of a TOML scene file"
-) -> str:
+def _read(path: Path, what: str, remedy: str) -> str:
     try:
         return content_of(path, what, LARGEST_FILE, remedy, _SHORTER).decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -13,17 +13,14 @@ from pydantic.fields import FieldInfo
 from hpcclear.base.errors import InputError
 from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import Content, NamedRows, Quantity
+from hpcclear.scene.fields import Content, NamedRows, Quantity, Tables
 from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 
 PHYSICAL = {
-    "mechanism": SliderCrank,
-    "drive": Drive,
-    "joints": CrankJoints,
-    "effects": EffectTables,
-}
+    "mechanism": SliderCrank, "drive": Drive, "joints": CrankJoints, "effects": EffectTables,
+}  # fmt: skip
 """The tables whose numbers describe the mechanism and what acts on it."""
 
 
@@ -57,7 +54,7 @@ _SEEN: dict[str, str] = {}
 
 
 @contextmanager
-def of_kinds(content: Mapping[str, object]) -> Iterator[None]:
+def of_kinds(content: Tables) -> Iterator[None]:
     """Within it, `quantities` knows the kinds of the loads of a scene's content, on which units of their entries depend."""
     mechanism = content.get("mechanism")
     rows = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
@@ -184,7 +181,7 @@ def described(paths: Sequence[str]) -> str:
     return alike.pop() if len(paths) > 1 and len(alike) == 1 else " and ".join(found)
 
 
-def replace(content: Mapping[str, object], path: str, value: object) -> Content:
+def replace(content: Tables, path: str, value: object) -> Content:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
     What is not a table on the way to it is replaced by one; the model then says what is wrong with
@@ -202,7 +199,7 @@ def replace(content: Mapping[str, object], path: str, value: object) -> Content:
     return copy
 
 
-def flatten(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flatten(content: Tables, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys and values of nested tables, in order."""
     for key, value in content.items():
         path = f"{prefix}{key}"
@@ -212,9 +209,9 @@ def flatten(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[s
             yield path, value
 
 
-def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, object]]:
+def files_named(content: Tables, prefix: str = "") -> dict[str, Tables]:
     """Return the tables of a parsed scene that name a file, by their dotted keys."""
-    found: dict[str, Mapping[str, object]] = {}
+    found: dict[str, Tables] = {}
     for key, entry in content.items():
         if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
             path = f"{prefix}{key}"

@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
@@ -63,10 +63,9 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
             raise invalid(reason, "Leave bending out, or replace it by two forces")
     held = set()
     for joint in planar.joints:
-        places = [
-            getattr(joint, name, "") or "" for name in ("journal", "bearing", "point", "line")
-        ]
-        ends = [point for own, _, point in (p.partition(".") for p in places) if own == body.name]
+        entries = ("journal", "bearing", "point", "line")
+        places = [(getattr(joint, name, "") or "").partition(".") for name in entries]
+        ends = [point for own, _, point in places if own == body.name]
         held.update(ends)
         if ends and joint.kind in ("slide", "fixed"):
             reason = f"{joint.name} guides the bar, but the modes are those of pinned ends"
@@ -213,17 +212,13 @@ class Planar(Table):
                     by_another = getattr(row, "angle_of", None) is not None
                     check_period(curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}")
 
-    @model_validator(mode="before")
     @classmethod
-    def _alike(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
         what they do not say, points are a body's own."""
-        if not isinstance(data, Mapping):
-            return data
-        written = dict(data)
+        written = dict(row)
         for table in ("bodies", "joints"):
-            rows = data.get(table)
-            if isinstance(rows, Mapping):
+            if isinstance(rows := row.get(table), Mapping):
                 written[table] = {name: _with_model(table, name, rows) for name in rows}
         return written
 

@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import REFERENCE, SCIPY, digest, is_trusting
-from hpcclear.scene.fields import Converted, NamedRows, Table, invalid
+from hpcclear.scene.fields import Converted, NamedRows, Table, Tables, invalid
 
 
 class UntrustedSource(InputError):
@@ -73,14 +73,13 @@ def as_invalid(key: str = "") -> Iterator[None]:
         raise invalid(reason, error.remedy, key) from error
 
 
-def texts_of(content: Mapping[str, object]) -> dict[str, str]:
+def texts_of(content: Tables) -> dict[str, str]:
     """Source texts that the content of a scene carries, by module; whatever else stands there."""
-    table: object = content.get("plugins")
+    table = content.get("plugins")
     rows = table.get("files") if isinstance(table, Mapping) else None
-    if not isinstance(rows, Mapping):
-        return {}
-    texts = {name: row.get("source") for name, row in rows.items() if isinstance(row, Mapping)}
-    return {str(name): text for name, text in texts.items() if isinstance(text, str)}
+    rows = rows.items() if isinstance(rows, Mapping) else ()
+    texts = {str(name): row.get("source") for name, row in rows if isinstance(row, Mapping)}
+    return {name: text for name, text in texts.items() if isinstance(text, str)}
 
 
 def modules_named(content: object) -> set[str]:
@@ -94,9 +93,7 @@ def modules_named(content: object) -> set[str]:
     return {module for one in inner for module in modules_named(one)}
 
 
-def with_texts(
-    content: Mapping[str, object], read: Callable[[str], str | None]
-) -> dict[str, object]:
+def with_texts(content: Tables, read: Callable[[str], str | None]) -> dict[str, object]:
     """The content with the texts of the modules that it names.
 
     `read` gives a module's text, None where there is no such file: whatever wants it says so.
@@ -112,7 +109,7 @@ def files_run(plugins: Plugins | None) -> tuple[str, ...]:
     return tuple(f"the scene names {one.name}.py: its Python code runs" for one in files)
 
 
-def check_trust(content: Mapping[str, object], name: str) -> None:
+def check_trust(content: Tables, name: str) -> None:
     """InputError if the content carries Python text and nobody has said that it may be run; `name`: where it stands."""
     texts = texts_of(content)
     if not texts or is_trusting():

@@ -42,12 +42,8 @@ class Points:
     """How a study drew them (`Study.method`); empty for designs that somebody chose, which are no random sample."""
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
-        if (
-            values.ndim != 2
-            or values.shape[1] != len(self.names)
-            or len(self.paths) != len(self.names)
-        ):
+        values, count = np.array(self.values, dtype=np.float64), len(self.names)
+        if values.ndim != 2 or values.shape[1] != count or len(self.paths) != count:
             reason = "one column per name is needed"
             raise InputError("points", values.shape, reason, "Give an (n, d) array")
         values.flags.writeable = False
@@ -102,9 +98,7 @@ class Numbers:
         return self(path) if there else np.zeros(self.size)
 
 
-def snapped(
-    study: Study, names: Sequence[str], coordinates: Array, *, model: bool = False
-) -> Array:
+def snapped(study: Study, names: Sequence[str], coordinates: Array, model: bool = False) -> Array:
     """The nearest designs that exist, in sampling coordinates, SI, (n, d), a column a name.
 
     With `model`, variables about whose designs something is random keep their numbers: a surrogate needs them between
@@ -130,11 +124,8 @@ def expanded(study: Study | None, points: Points) -> Points:
     """Designs with what rows of catalogues stand for in columns of their own, named by their paths."""
     if study is None:
         return points
-    chosen = [
-        (k, study.variable(name))
-        for k, name in enumerate(points.names)
-        if name in study.names and study.variable(name).rows
-    ]
+    by_rows = {one.name: one for one in study.variables if one.rows}
+    chosen = [(k, by_rows[name]) for k, name in enumerate(points.names) if name in by_rows]
     if not chosen:
         return points
     names, paths, columns = list(points.names), list(points.paths), list(points.values.T)
@@ -152,9 +143,11 @@ def expanded(study: Study | None, points: Points) -> Points:
     return Points(tuple(names), values, tuple(paths), points.labels, points.sampling)
 
 
-def check_points(
-    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
-) -> None:
+Label = Callable[[int], str]
+"""What a row of points is called in errors."""
+
+
+def check_points(scene: Scene, points: Points, label: Label = "sample {}".format) -> None:
     """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
 
     Raises InputError if a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's radius,
@@ -186,7 +179,7 @@ def check_points(
     _check_laws(get, points, label)
 
 
-def _check_laws(get: Numbers, points: Points, label: Callable[[int], str]) -> None:
+def _check_laws(get: Numbers, points: Points, label: Label) -> None:
     """Refuse values that a law does not take together."""
     driven = {path for paths in points.paths for path in paths}
     for kind in ("contact", "friction"):
@@ -200,14 +193,11 @@ def _check_laws(get: Numbers, points: Points, label: Callable[[int], str]) -> No
             wrong = table.declared.check({**table.values(), **own})
             if wrong is not None:
                 reason, remedy, name = wrong
-                raise InputError(
-                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
-                )
+                value = own.get(name, table.value(name))
+                raise InputError(f"{label(row)}, {name}", value, reason, remedy)
 
 
-def _refuse(
-    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
-) -> None:
+def _refuse(bad: Booleans, values: Array, name: str, reason: str, label: Label) -> None:
     if bad.any():
         row = int(np.argmax(bad))
         key = f"{label(row)}, {name}"

@@ -7,7 +7,6 @@ from math import inf, log1p, sqrt
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError, at, nearest
@@ -239,13 +238,10 @@ class RandomInput(NamedInput):
     """Whether the distribution is that of the difference from the design's value. Not for "uniform", "normal",
     "truncated-normal", "beta", "fit" and "wear"."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _in_si(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """The row with its paths, and numbers in the unit of these."""
-        if not isinstance(data, Mapping):
-            return data
-        row, paths = with_paths(data)
+        row, paths = with_paths(row)
         quantity = quantities()[paths[0]]
         if not is_ours(row.get("distribution")):
             row = _gathered(row, quantity.unit)
@@ -299,11 +295,7 @@ class RandomInput(NamedInput):
                 reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
                 remedy = "Widen it"
                 raise invalid(reason, remedy, "range" if self.range is not None else "half_width")
-        if (
-            isinstance(law, quantiles.Cut)
-            and self.range is not None
-            and self.distribution != "beta"
-        ):
+        if isinstance(law, quantiles.Cut) and self.range and self.distribution != "beta":
             below, above = law.chances
             if above - below < _LEAST_SHARE:
                 reason = f"contains less than {_LEAST_SHARE:g} of the distribution"

@@ -83,17 +83,15 @@ def _chances(
     if replicates is None:
         label = f"monte-carlo {purpose}"
         return [uniform(seed, label, name, first, count) for name in names]
-    parts = [_scrambled(seed, purpose, one, len(names), first, count) for one in replicates]
+    parts = [_scrambled(seed, purpose, one, len(names), span) for one in replicates]
     return list(np.concatenate(parts).T)
 
 
 @lru_cache(maxsize=64)
-def _scrambled(
-    seed: int, purpose: str, replicate: int, dimensions: int, first: int, count: int
-) -> Array:
-    """Points of a randomised sequence, (count, dimensions), read only: all designs of a study meet the same."""
+def _scrambled(seed: int, purpose: str, replicate: int, size: int, span: tuple[int, int]) -> Array:
+    """Points of a randomised sequence, (count, size), read only: all designs of a study meet the same."""
     rng = generator(seed, f"sobol {purpose}", str(replicate))
-    points = sobol(dimensions, rng, first, count)
+    points = sobol(size, rng, *span)
     points.flags.writeable = False
     return points
 
@@ -126,9 +124,8 @@ def monte_carlo(
     count = _count(study, samples, first)
     inputs = {row.name: row for row in study.random}
     chosen = _known("random", inputs if random is None else random, inputs)
-    fixed = (
-        None if design is None else {n: design[n] for n in _known("design", design, study.names)}
-    )
+    named = _known("design", design or (), study.names)
+    fixed = None if design is None else {name: design[name] for name in named}
     free = tuple(name for name in study.names if fixed is None or name in fixed)
     names = (*free, *(name for name in chosen if name not in free))
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
@@ -209,10 +206,8 @@ def offsets(
     study = scene.required_study
     if study.correlation is not None:
         chances = study.correlation.together(random, chances)
-    rows = [study.random_input(name) for name in random]
-    return {
-        row.name: study.law(row, design or {})(one) for row, one in zip(rows, chances, strict=True)
-    }
+    laws = (study.law(study.random_input(name), design or {}) for name in random)
+    return {name: law(one) for name, law, one in zip(random, laws, chances, strict=True)}
 
 
 def _together(

@@ -25,17 +25,12 @@ def _tables(kind: type[Table] = Table) -> Iterator[type[Table]]:
 def _attribute_docs(table: type[Table]) -> dict[str, str]:
     """What stands below each entry of a table in its source."""
     tree = ast.parse(inspect.getsource(sys.modules[table.__module__]))
-    (body,) = (
-        node.body
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ClassDef) and node.name == table.__name__
-    )
+    classes = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    (body,) = (node.body for node in classes if node.name == table.__name__)
     docs = {}
     for entry, below in itertools.pairwise(body):
         match entry, below:
-            case ast.AnnAssign(target=ast.Name(id=key)), ast.Expr(
-                value=ast.Constant(value=str(words))
-            ):
+            case ast.AnnAssign(target=ast.Name(id=key)), ast.Expr(ast.Constant(str(words))):
                 docs[key] = inspect.cleandoc(words)
     return docs
 
@@ -46,10 +41,9 @@ def _describe(definitions: JsonSchemaValue) -> None:
     Pydantic can do so itself, but as soon as a table is defined: a fifth of a second of every command, rank and test.
     """
     for table in _tables():
-        kinds = [kind for kind in table.__mro__ if issubclass(kind, Table)]
-        docs = {
-            key: words for kind in reversed(kinds) for key, words in _attribute_docs(kind).items()
-        }
+        docs = dict[str, str]()
+        for kind in reversed([kind for kind in table.__mro__ if issubclass(kind, Table)]):
+            docs |= _attribute_docs(kind)
         entries = definitions.get(table.__name__, {}).get("properties", {})
         for key, entry in entries.items():
             if key in docs:
@@ -64,9 +58,7 @@ def _as_written(definitions: JsonSchemaValue) -> None:
     for row in definitions.values():
         if "name" in row["properties"]:  # the key it stands under
             del row["properties"]["name"]
-            row["required"] = [
-                key for key in row.get("required", []) if key not in ("name", "paths")
-            ]
+            row["required"] = [k for k in row.get("required", []) if k not in ("name", "paths")]
     for place in ("Position", "NamedPlace", "Components"):
         row = definitions[place]
         number = row["properties"]["x"]
@@ -79,11 +71,9 @@ def _as_written(definitions: JsonSchemaValue) -> None:
         entries = {key: True for kind in kinds for key in definitions[kind]["properties"]}
         like = {"type": "string", "description": f"another of the {name}, whose entries it takes"}
         alike = {
-            "type": "object",
-            "properties": {**entries, "like": like},
-            "required": ["like"],
+            "type": "object", "properties": {**entries, "like": like}, "required": ["like"],
             "additionalProperties": False,
-        }
+        }  # fmt: skip
         rows[name]["additionalProperties"] = {"anyOf": [one, alike]}
 
 
@@ -115,8 +105,7 @@ def scene_schema() -> JsonSchemaValue:
     It says which keys and kinds of values there are; what makes a mechanism is checked by
     `load_scene` alone.
     """
-    schema = Scene.model_json_schema()
-    schema = _with_files(schema)
+    schema = _with_files(Scene.model_json_schema())
     definitions = schema["$defs"]
     definitions["FileCurve"] = FileCurve.model_json_schema()
     _describe({**definitions, "Scene": schema})
@@ -134,11 +123,8 @@ def scene_schema() -> JsonSchemaValue:
         choices = entry.get("anyOf", [{"$ref": entry.get("$ref")}])
         kept = {word: entry[word] for word in ("description", "default") if word in entry}
         effects[key] = {"anyOf": [*choices, {"const": "none"}], **kept}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **schema,
-        "title": "hpcclear scene",
-    }
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": draft, **schema, "title": "hpcclear scene"}
 
 
 def _inputs(definitions: JsonSchemaValue) -> None:
@@ -147,9 +133,8 @@ def _inputs(definitions: JsonSchemaValue) -> None:
         entries = definitions[name]["properties"]
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
-    definitions["RandomInput"]["additionalProperties"] = (
-        True  # parameters of a distribution from elsewhere
-    )
+    # parameters of a distribution from elsewhere
+    definitions["RandomInput"]["additionalProperties"] = True
     entries = definitions["RandomInput"]["properties"]
     names = {"anyOf": [{"enum": list(OURS)}, {"type": "string"}]}
     entries["distribution"] = {**names, "description": entries["distribution"]["description"]}
@@ -161,12 +146,8 @@ def _inputs(definitions: JsonSchemaValue) -> None:
 def _cases(definitions: JsonSchemaValue) -> None:
     """Cases of a study with their objectives and constraints, and its accuracy."""
     one_word = {"enum": ["mean", "deviation", "quantile", "cost"]}  # an exceedance needs a limit
-    goals = {
-        "type": "array",
-        "items": {"anyOf": [one_word, {"$ref": "#/$defs/Goal"}]},
-        "minItems": 1,
-        "maxItems": len(ENDS),
-    }
+    goal = {"anyOf": [one_word, {"$ref": "#/$defs/Goal"}]}
+    goals = {"type": "array", "items": goal, "minItems": 1, "maxItems": len(ENDS)}
     entries = definitions["Case"]["properties"]
     entries["objectives"] = {**goals, "description": entries["objectives"]["description"]}
     case = {"anyOf": [{"$ref": "#/$defs/Case"}, definitions["Case"]["properties"]["random"]]}

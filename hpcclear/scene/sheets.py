@@ -148,9 +148,8 @@ class Sheet:
         Raises InputError if a cell holds no number.
         """
         if column.unit or not all(map(self._has_unit, column.cells)):
-            return [
-                written(value, column.unit) for value in self.si(column, column.unit, "").tolist()
-            ]
+            values = self.si(column, column.unit, "").tolist()
+            return [written(value, column.unit) for value in values]
         made = list[float | str]()
         for row, cell in enumerate(column.cells):
             comma, stored = self._signs(cell)

@@ -5,9 +5,9 @@ Nothing below the scene depends on which template wrote a linkage; `SERIES` and 
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hpcclear.base.written import shown
 from hpcclear.scene.contacts.guide import Guide, PlanarSlide
@@ -68,11 +68,9 @@ class SliderCrank(Table):
         offset = abs(self.offset or 0.0)
         if self.rod.length <= self.crank.length + offset:
             beside = f" and the offset ({shown(offset, 'm')})" if offset else ""
-            least = (
-                f"the rod must be longer than the crank ({shown(self.crank.length, 'm')}){beside}"
-            )
+            least = f"({shown(self.crank.length, 'm')}){beside}, or the crank cannot rotate"
             remedy = "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset)
-            raise invalid(f"{least}, or the crank cannot rotate", remedy, "rod.length")
+            raise invalid(f"the rod must be longer than the crank {least}", remedy, "rod.length")
 
 
 Drive = Annotated[CrankSpeed | CrankTorque, Field(discriminator="kind")]
@@ -92,19 +90,13 @@ class IdealJoint(Table):
     friction: IdealPinFriction | None = None
     """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _no_dimensions(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         # What a clearance joint needs may stay in the file, so that `--set
         # joints.crank_rod.kind=ideal` is enough to switch one off; it is dropped here, so that it
         # cannot make two equal scenes look different.
-        if isinstance(data, Mapping):
-            return {
-                key: value
-                for key, value in data.items()
-                if key not in ClearanceJoint.model_fields or key == "kind"
-            }
-        return data
+        dimensions = ClearanceJoint.model_fields.keys() - {"kind"}
+        return {key: value for key, value in row.items() if key not in dimensions}
 
 
 class SliderGuide(Guide):
@@ -199,12 +191,9 @@ def linkage_of(
         for name, bar in (("crank", mechanism.crank), ("rod", mechanism.rod))
     ]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
-    turning: Content = (
-        {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
-    )
-    slider = PlanarBody.model_construct(
-        name="slider", mass=mechanism.slider.mass, points=(pin,), **turning
-    )
+    own = mechanism.slider
+    turning: Content = {} if own.inertia is None else {"inertia": own.inertia}
+    slider = PlanarBody.model_construct(name="slider", mass=own.mass, points=(pin,), **turning)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
         beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
@@ -218,15 +207,14 @@ def linkage_of(
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o",
         friction=getattr(joints.crank_frame, "friction", None),
     )  # fmt: skip
-    load = ForceLoad.model_construct(
-        name="load", kind="force", place="slider.pin", size=effects.slider_load
-    )
+    size = effects.slider_load
+    load = ForceLoad.model_construct(name="load", kind="force", place="slider.pin", size=size)
     return Planar.model_construct(
         bodies=(*bars, slider),
         ground=ground,
         joints=(frame, guide, *(_joint(name, getattr(joints, name)) for name in JOINTS)),
         drives=(_drive(drive),),
-        loads=() if load.size is None else (load,),
+        loads=() if size is None else (load,),
     )
 
 
@@ -243,13 +231,11 @@ def _joint(name: str, joint: ClearanceJoint | IdealJoint) -> PlanarJoint:
     places: Content = dict(zip(("name", "journal", "bearing"), (name, *JOINTS[name]), strict=True))
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
-    return PlanarClearance.model_construct(
-        **places, **_entries(joint, PinInBearing), **_materials(joint)
-    )
+    entries = _entries(joint, PinInBearing) | _materials(joint)
+    return PlanarClearance.model_construct(**places, **entries)
 
 
 def _drive(drive: Drive) -> PlanarDrive:
     model = PlanarSpeed if isinstance(drive, CrankSpeed) else PlanarTorque
-    return model.model_construct(
-        name="drive", body="crank", period=True, **_entries(drive, type(drive))
-    )
+    entries = _entries(drive, type(drive))
+    return model.model_construct(name="drive", body="crank", period=True, **entries)

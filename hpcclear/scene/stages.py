@@ -63,9 +63,8 @@ class Sensitivity(Table):
 
     def chooses(self, inputs: int, order: int, samples: int) -> bool:
         """Whether a surface of that order on so many samples chooses its terms."""
-        return self.terms == "chosen" or (
-            self.terms is None and math.comb(inputs + order, order) >= samples
-        )
+        many = math.comb(inputs + order, order) >= samples
+        return self.terms == "chosen" or (self.terms is None and many)
 
     def _check(self) -> None:
         if self.sobol_samples & (self.sobol_samples - 1):

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-
-from pydantic import model_validator
+from typing import Any
 
 from hpcclear.base.arithmetic import names_in
 from hpcclear.base.errors import at
@@ -23,14 +22,11 @@ LEAST_PER_INPUT = 3
 class Study(StudyTables):
     """Sampling and optimisation over a scene."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """Cases as plain lists of names, random inputs with the paths of the variable of that name,
         and the sensitivity's parameter."""
-        if not isinstance(data, Mapping):
-            return data
-        data = dict(data)
+        data = dict(row)
         stage = data.get("verification")
         if isinstance(stage, Mapping) and "accuracy" in stage and "accuracy" not in data:
             # files of earlier versions have it there
@@ -41,19 +37,11 @@ class Study(StudyTables):
         cases, variables, random = data.get("cases"), data.get("variables"), data.get("random")
         if isinstance(cases, Mapping):
             asked = data.get("objective", "mean-gap")
-            data["cases"] = {
-                name: {"random": case}
-                if isinstance(case, (list, tuple))
-                else in_si(case, asked, f"cases.{name}")
-                for name, case in cases.items()
-            }
+            data["cases"] = {n: in_si(one, asked, f"cases.{n}") for n, one in cases.items()}
         if isinstance(random, Mapping) and isinstance(variables, Mapping):
-            data["random"] = {
-                name: _with_paths(row, variables.get(name)) for name, row in random.items()
-            }
-            data["variables"] = {
-                name: _with_unit(row, data["random"]) for name, row in variables.items()
-            }
+            found = {name: _with_paths(one, variables.get(name)) for name, one in random.items()}
+            data["variables"] = {name: _with_unit(one, found) for name, one in variables.items()}
+            data["random"] = found
         stage = data.get("sensitivity", {})
         if isinstance(variables, Mapping) and isinstance(stage, Mapping):
             data["sensitivity"] = {"parameter": _only_clearance(variables), **stage}
@@ -78,14 +66,12 @@ class Study(StudyTables):
             for path in (*variable.paths, *self.own_entries(variable)):
                 claim(owner, path, variable.name, f"variables.{variable.name}")
         for row in self.random:
-            other = next(
-                (owner[path] for path in row.paths if owner.get(path, row.name) != row.name), None
-            )
-            if other is not None or (
-                row.name in self.names and self.variable(row.name).paths != row.paths
-            ):
-                reason = f"drives what the study variable {other or row.name} drives"
-                remedy = f"Name the random input {other or row.name}, without a path"
+            others = [owner[p] for p in row.paths if owner.get(p, row.name) != row.name]
+            alike = row.name not in self.names or self.variable(row.name).paths == row.paths
+            if others or not alike:
+                other = (*others, row.name)[0]
+                reason = f"drives what the study variable {other} drives"
+                remedy = f"Name the random input {other}, without a path"
                 raise invalid(reason, remedy, f"random.{row.name}")
             for path in row.paths:
                 claim(owner, path, row.name, f"random.{row.name}")
@@ -113,9 +99,8 @@ class Study(StudyTables):
         else:
             inside = bool(row.relative) or self.moves(row) or high - low <= upper - lower + slack
         if not inside:
-            reason = (
-                f"the distribution is wider than its domain, {row.name} from {lower:g} to {upper:g}"
-            )
+            domain = f"{row.name} from {lower:g} to {upper:g}"
+            reason = f"the distribution is wider than its domain, {domain}"
             remedy = f"Narrow it, or widen study.variables.{row.name}.range"
             remedy += f", so that it contains {low:.4g} to {high:.4g}" if row.absolute else ""
             raise invalid(reason, remedy, f"random.{row.name}")
@@ -227,9 +212,8 @@ class Study(StudyTables):
             parameter = self.sensitivity.parameter
             if parameter is None:
                 reason = "not one variable drives clearances, so the fixed parameter is not known"
-                raise invalid(
-                    reason, f"Name one of {', '.join(self.names)}", "sensitivity.parameter"
-                )
+                remedy = f"Name one of {', '.join(self.names)}"
+                raise invalid(reason, remedy, "sensitivity.parameter")
             check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):
                 reason = "the parameter is fixed, so it cannot be an input of a surface"

@@ -131,23 +131,17 @@ class StudyTables(Table):
         if self.sensitivity.parameter not in self.names:
             return ()
         owner = {row.paths[0]: row.name for row in self.variables if len(row.paths) == 1}
-        pairs = (
-            (owner.get(f"mechanism.{one}.{number}"), owner.get(f"mechanism.{other}.{number}"))
-            for number in _LINK_NUMBERS
-            for one, other in itertools.pairwise(_LINKS)
-        )
-        found = ((one, other) for one, other in pairs if one is not None and other is not None)
-        return tuple(found) or self._two_by_two()
+        pairs = list[Names]()
+        for number in _LINK_NUMBERS:
+            own = [owner.get(f"mechanism.{link}.{number}", "") for link in _LINKS]
+            pairs += [pair for pair in itertools.pairwise(own) if all(pair)]
+        return tuple(pairs) or self._two_by_two()
 
     def _two_by_two(self) -> tuple[Names, ...]:
         """Variables of a linkage's bodies in file order; the last of an odd number goes with the two before it."""
-        of_bodies = [
-            row.name
-            for row in self.variables
-            if row.name != self.sensitivity.parameter
-            and row.paths
-            and all(path.startswith("mechanism.bodies.") for path in row.paths)
-        ]
+        rows = [row for row in self.variables if row.paths]
+        named = [r.name for r in rows if all(p.startswith("mechanism.bodies.") for p in r.paths)]
+        of_bodies = [name for name in named if name != self.sensitivity.parameter]
         last = max(len(of_bodies) - len(of_bodies) % 2 - 2, 0)
         pairs = [tuple(of_bodies[k : k + 2]) for k in range(0, last, 2)]
         return tuple(group for group in (*pairs, tuple(of_bodies[last:])) if group)
@@ -178,31 +172,23 @@ class StudyTables(Table):
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""
         rows = {row.name: row for row in self.random}
         random = self.case(case).random
-        return tuple(
-            name for name in self.optimisation if not (name in random and rows[name].absolute)
-        )
+        fixed = {name for name in random if rows[name].absolute}
+        return tuple(name for name in self.optimisation if name not in fixed)
 
     def own_entries(self, variable: StudyVariable) -> tuple[str, ...]:
         """Numbers of the scene that rows of a variable have, but for clearances of fits that a random input draws."""
-        drawn = {
-            path
-            for row in self.random
-            if any(path == f"random.{row.name}.fit" for path in variable.input_paths)
-            for path in row.paths
-        }
+        rows = [row for row in self.random if f"random.{row.name}.fit" in variable.input_paths]
+        drawn = {path for row in rows for path in row.paths}
         return tuple(path for path in variable.entry_paths if path not in drawn)
 
     @cached_property
     def _drivers(self) -> dict[str, tuple[StudyVariable, ...]]:
         """Variables that drive each random input."""
-        return {
-            row.name: tuple(
-                one
-                for one in self.variables
-                if any(input_entry(path)[0] == row.name for path in one.input_paths)
-            )
-            for row in self.random
-        }
+        found: dict[str, tuple[StudyVariable, ...]] = {row.name: () for row in self.random}
+        for one in self.variables:
+            for name in {input_entry(path)[0] for path in one.input_paths} & found.keys():
+                found[name] += (one,)
+        return found
 
     def drivers(self, row: RandomInput) -> tuple[str, ...]:
         """Names of the variables that drive entries of a random input."""

@@ -45,9 +45,7 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
         return
     ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths
     if film.law.further is not None and not least <= ratio <= most:
-        reason = (
-            f"is for lengths from {least:g} to {most:g} diameters, and this is {ratio:.3g} long"
-        )
+        reason = f"is for lengths of {least:g} to {most:g} diameters, and this is {ratio:.3g} long"
         remedy = 'Take "short"' if ratio < 1.0 else 'Take "long"'
         raise invalid(reason, remedy, "film.model")
     if 4.0 * film.roughness > clearance:
@@ -86,11 +84,8 @@ class SurfaceWaves(Table):
 
     def given(self) -> int:
         """The number of the last wave that is not zero."""
-        found = [
-            n for n in range(1, MOST_WAVES + 1)
-            if getattr(self, f"cosine_{n}") or getattr(self, f"sine_{n}")
-        ]  # fmt: skip
-        return max(found, default=0)
+        entries = [name for name in type(self).model_fields if getattr(self, name)]
+        return max((int(name.rpartition("_")[2]) for name in entries), default=0)
 
     def deepest(self) -> float:
         """What the depth can come to at most, m."""
@@ -137,9 +132,7 @@ class WornSurface(Table):
             "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
         )  # fmt: skip
         if (self.dimensionless is None) != (self.hardness is None):
-            reason = (
-                "a dimensionless coefficient needs a hardness; a coefficient in m2/N must have none"
-            )
+            reason = "a dimensionless coefficient needs a hardness, and one in m2/N must have none"
             raise invalid(reason, "Give both, or neither", "hardness")
 
 

@@ -3,6 +3,7 @@
 An effect that has a cheaper model is there more than once: as a whole, and as what its model has beyond the cheaper one.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -52,9 +53,8 @@ class Switch:
 
     def excludes(self, other: "Switch") -> bool:
         """Whether both change the same entries, as two models of one effect do, or clearance and film of a joint."""
-        return any(
-            _holds(key, own) or _holds(own, key) for key in self.changes for own in other.changes
-        )
+        pairs = itertools.product(self.changes, other.changes)
+        return any(_holds(key, own) or _holds(own, key) for key, own in pairs)
 
 
 def _holds(key: str, path: str) -> bool:
@@ -81,11 +81,8 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         ideal = joint.ideal()
         if ideal is None:
             continue
-        entries: Content | None = {
-            name: getattr(ideal, name)
-            for name in type(ideal).model_fields
-            if name in ideal.model_fields_set - {"name"}
-        }
+        own = (name for name in type(ideal).model_fields if name in ideal.model_fields_set)
+        entries: Content | None = {name: getattr(ideal, name) for name in own if name != "name"}
         if scene.template is not None:
             entries = {"kind": "ideal"} if joint.round else None
         yield Switch(f"clearance in {label}", {scene.joint_key(label): entries}, joint=label)
@@ -141,21 +138,15 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
     table = scene.effects.contact if scene.clearance_joints() else None
     if table is None or not table.declared.without_loss:
         return
-    if table.declared.lossless is None or not table.declared.lossless(table.values()):
-        floor = "effects.contact.minimum_impact_speed"
-        elastic = {
-            "law": table.declared.without_loss,
-            "minimum_impact_speed": table.minimum_impact_speed,
-        }
-        kept = [floor]
-        if (shape := table.declared.geometry) is not None:
-            names = [one.name for one in shape.parameters]
-            elastic |= {"geometry": table.geometry, "curve": table.curve} | {
-                name: table.value(name) for name in names
-            }
-            kept += [f"effects.contact.{name}" for name in names]
-        moved = {path: path for path in kept}
-        yield Switch("contact damping", {"effects.contact": elastic}, moved)
+    law = table.declared
+    if law.lossless is None or not law.lossless(table.values()):
+        kept: Content = {"minimum_impact_speed": table.minimum_impact_speed}
+        elastic: Content = {"law": law.without_loss}
+        if law.geometry is not None:
+            kept |= {one.name: table.value(one.name) for one in law.geometry.parameters}
+            elastic |= {"geometry": table.geometry, "curve": table.curve}
+        moved = {path: path for path in (f"effects.contact.{name}" for name in kept)}
+        yield Switch("contact damping", {"effects.contact": elastic | kept}, moved)
 
 
 def _outside(scene: Scene) -> Iterator[Switch]:
@@ -164,7 +155,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
-        yield from _mean(scene, "slider load", "effects.slider_load", effects.slider_load)
+        yield from _mean(scene, "slider load", "effects.slider_load", effects.slider_load, 0)
     for key, (words, _) in scene.joint_frictions().items():
         yield Switch(words, {key: None})
     for key, words in scene.joint_effects().items():
@@ -174,16 +165,14 @@ def _outside(scene: Scene) -> Iterator[Switch]:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})
             if isinstance(load, SizedLoad):
-                entry, turns = load.size_entry, 1 if load.angle_of else None
+                entry, turns = load.size_entry, 1 if load.angle_of else 0
                 yield from _mean(scene, load.name, f"{key}.{entry}", getattr(load, entry), turns)
 
 
-def _mean(
-    scene: Scene, name: str, key: str, curve: Curve | None, turns: int | None = None
-) -> Iterator[Switch]:
-    """Replace a load that is tabulated over some turns, those of the scene by default, by the mean of the curve that acts."""
+def _mean(scene: Scene, name: str, key: str, curve: Curve | None, turns: int) -> Iterator[Switch]:
+    """Replace a load that is tabulated over some turns, 0 for those of the scene, by the mean of the curve that acts."""
     if isinstance(curve, tuple):
-        length = 2.0 * np.pi * (turns_of(scene.linkage) if turns is None else turns)
+        length = 2.0 * np.pi * (turns or turns_of(scene.linkage))
         mean = periodic(curve, length, scene.numerics.interpolation).mean()
         yield Switch(f"variation of {name}", {key: mean})
 
@@ -202,7 +191,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
         if drive.torque is not None:
-            yield from _mean(scene, f"torque{whose}", f"{key}.torque", drive.torque)
+            yield from _mean(scene, f"torque{whose}", f"{key}.torque", drive.torque, 0)
 
 
 class Off:
@@ -215,10 +204,8 @@ class Off:
     def __init__(self, scene: Scene, off: Sequence[Switch]) -> None:
         self._off = list(off)
         joints = {one.joint for one in off if one.joint is not None}
-        if joints and joints == set(scene.clearance_joints()):
-            self._off.append(
-                Switch("", {"effects.friction": {"law": "none"}})
-            )  # acts in clearances only
+        if joints and joints == set(scene.clearance_joints()):  # where alone friction acts
+            self._off.append(Switch("", {"effects.friction": {"law": "none"}}))
         self.scene = self._made(scene)
 
     def paths(self, paths: Sequence[str]) -> tuple[str, ...]:
@@ -253,40 +240,25 @@ class Off:
                 if paths:
                     same = paths == row.paths
                     left[table][row.name] = own if same else {**own, "paths": list(paths)}
-        cases = {
-            case.name: {
-                **content["cases"][case.name],
-                "random": [name for name in case.random if name in left["random"]],
-            }
-            for case in study.cases
-        }
-        cases = {name: case for name, case in cases.items() if case["random"]}
+        cases: Content = {}
+        for case in study.cases:
+            if random := [name for name in case.random if name in left["random"]]:
+                cases[case.name] = {**content["cases"][case.name], "random": random}
         if not left["variables"] or (study.cases and not cases):
             reason = "no variable would be left"
             raise InputError("study", None, reason, "Keep the effect that it varies")
-        kept = {key: value for key, value in content.items() if key != "correlation"}
-        return {
-            **kept,
-            **left,
-            **_correlated(content.get("correlation"), left["random"]),
-            **({"cases": cases} if study.cases else {}),
-            "sensitivity": _named(content["sensitivity"], left["variables"]),
-            "surrogate": _named(content["surrogate"], left["variables"]),
-        }
-
-
-def _correlated(table: Content | None, names: Mapping[str, object]) -> Content:
-    """The study's correlation among the random inputs that are left, if it has one."""
-    rows = [] if table is None else [k for k, name in enumerate(table["inputs"]) if name in names]
-    if table is None or len(rows) < 2:
-        return {}
-    return {
-        "correlation": {
-            **table,
-            "inputs": [table["inputs"][k] for k in rows],
-            "matrix": [[table["matrix"][k][j] for j in rows] for k in rows],
-        }
-    }
+        kept = {key: value for key, value in content.items() if key != "correlation"} | left
+        for stage in ("sensitivity", "surrogate"):
+            kept[stage] = _named(content[stage], left["variables"])
+        if study.cases:
+            kept["cases"] = cases
+        whole = content.get("correlation") or {"inputs": []}
+        places = [k for k, name in enumerate(whole["inputs"]) if name in left["random"]]
+        if len(places) > 1:
+            inputs = [whole["inputs"][k] for k in places]
+            matrix = [[whole["matrix"][k][j] for j in places] for k in places]
+            kept["correlation"] = {**whole, "inputs": inputs, "matrix": matrix}
+        return kept
 
 
 def _named(table: Content, names: Content) -> Content:

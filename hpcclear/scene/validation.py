@@ -12,7 +12,7 @@ from hpcclear.base.units import factor, is_written_in, noting
 from hpcclear.base.written import Reading, reading
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
-from hpcclear.scene.fields import LARGEST, Content, Table, hint, invalid, nearest
+from hpcclear.scene.fields import LARGEST, Content, Table, Tables, hint, invalid, nearest
 from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.planar import JOINTS
@@ -52,7 +52,7 @@ def check_path(path: object) -> None:
         raise InputError("path", path, "is not a dotted path", "Write, say, mechanism.rod.mass")
 
 
-def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
+def validated(model: type[Valid], content: Tables) -> Valid:
     """Tables as a model of its kind.
 
     Raises InputError if it is not valid: the first thing to mend, with key, value, reason and remedy.
@@ -106,7 +106,7 @@ def _numbers_in(content: object) -> Iterator[float]:
         yield content
 
 
-def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[Reading]:
+def _placed(content: Tables, read: Mapping[str, str]) -> Iterator[Reading]:
     """Each text that was read as `read` says, with the first entry that has it."""
     left = dict(read)
     for key, entry in flatten(content):
@@ -188,7 +188,7 @@ def _check_corners(scene: SceneTables, study: Study) -> None:
 
 def _check_corner(
     kind: type[SceneTables],
-    content: Mapping[str, object],
+    content: Tables,
     entries: Mapping[str, float],
     key: str,
     words: str,
@@ -206,7 +206,7 @@ def _check_corner(
         raise invalid(f"reaches {words}, which makes no mechanism: {reason}", remedy, key) from None
 
 
-def _check_depth(content: Mapping[str, object]) -> None:
+def _check_depth(content: Tables) -> None:
     level: list[object] = [content]
     for _ in range(DEEPEST):
         level = [
@@ -221,7 +221,7 @@ def _check_depth(content: Mapping[str, object]) -> None:
     raise InputError("scene", "...", "is nested too deeply", remedy)
 
 
-def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
+def _translated(error: ErrorDetails, content: Tables, more: int) -> InputError:
     location = _untagged(error["loc"], error["type"])
     said = error.get("ctx", {}).get("error")
     if isinstance(said, InputError):

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import at
@@ -70,9 +70,8 @@ class StudyVariable(NamedInput):
             given = texts_in(data["follows"])
             if not given:
                 raise invalid("holds no paths", "Write them as path or paths", key="follows")
-        of_rows = [
-            p for p in given if p.startswith(OF_RANDOM) or ("fits" in data and p.endswith(".fit"))
-        ]
+        fits = [p for p in given if "fits" in data and p.endswith(".fit")]
+        of_rows = [p for p in given if p.startswith(OF_RANDOM) or p in fits]
         if not of_rows:
             return data
         if len(of_rows) < len(given):
@@ -91,13 +90,10 @@ class StudyVariable(NamedInput):
         kept = {key: value for key, value in data.items() if key != "path"}
         return {**kept, "paths": (), "follows": tuple(of_rows)}
 
-    @model_validator(mode="before")
     @classmethod
-    def _in_si(cls, data: object) -> object:
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """The row with its paths, and numbers in the unit of these."""
-        if not isinstance(data, Mapping):
-            return data
-        row, paths = with_paths(cls._without_numbers(data))
+        row, paths = with_paths(cls._without_numbers(row))
         kinds = [key for key in _KINDS if key in row]
         if len(kinds) != 1:
             raise invalid(

@@ -1,10 +1,9 @@
 """A pin with clearance: a journal in a round bearing larger than itself, also with an oil film and surfaces out of round."""
 
-from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.written import shown
@@ -44,7 +43,9 @@ class PinInBearing(ContactGeometry):
     out_of_round: OutOfRound | None = None
     """Waviness of its surfaces. Without it they are round."""
 
-    _in_radii = model_validator(mode="before")(with_clearance)
+    @classmethod
+    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+        return with_clearance(row)
 
     def _check(self) -> None:
         """A journal is left, and film and waves fit into the clearance."""

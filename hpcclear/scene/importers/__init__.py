@@ -4,8 +4,8 @@ To add one: a module with `drawing_of(file)`, which returns a `Drawing` or refus
 in `FORMATS`.
 """
 
-from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 from hpcclear.base.errors import at, content_of
@@ -24,28 +24,17 @@ class Format(NamedTuple):
     """A kind of file."""
 
     name: str
-    drawing_of: Callable[[File], Drawing]
-    begins: Callable[[bytes], bool]
-    """Whether a file is of this kind, by its first bytes."""
+    module: ModuleType
+    """With `drawing_of`, and `begins`: whether a file is of this kind, by its first bytes."""
     again: str = "Save the drawing again"
     """What to do where it is incomplete."""
 
 
 FORMATS = (
-    Format(
-        "PMKS+ project or link",
-        pmks.drawing_of,
-        pmks.begins,
-        "Copy the whole link, or save the project again",
-    ),
-    Format(
-        "Linkage document (.linkage2)",
-        linkage2.drawing_of,
-        linkage2.begins,
-        "Save the document again",
-    ),
-    Format("DXF drawing", dxf.drawing_of, dxf.begins),
-    Format("table of points", table.drawing_of, lambda data: True),
+    Format("PMKS+ project or link", pmks, "Copy the whole link, or save the project again"),
+    Format("Linkage document (.linkage2)", linkage2, "Save the document again"),
+    Format("DXF drawing", dxf),
+    Format("table of points", table),
 )
 """Formats, in the order in which they are tried; the last takes what is left."""
 
@@ -61,8 +50,9 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
             to_si(f"1 {unit}", "m")
     remedies = "Check the file", "Save the mechanism alone"
     data = content_of(path, "file", LARGEST_FILE, *remedies) if path.is_file() else b""
-    found = next(one for one in FORMATS if one.begins(data[:4096]))
-    return found.drawing_of(File(path, data, unit, found.again))
+    found = next(one for one in FORMATS if one.module.begins(data[:4096]))
+    made: Drawing = found.module.drawing_of(File(path, data, unit, found.again))
+    return made
 
 
 def linkage_of(path: Path, unit: str = "") -> Content:

@@ -72,11 +72,8 @@ class _Body:
 
 def begins(data: bytes) -> bool:
     """Whether a file is a DXF drawing, ASCII or binary."""
-    return (
-        data.startswith(b"AutoCAD Binary DXF")
-        or re.match(rb"(\xef\xbb\xbf)?(\s*999\r?\n[^\n]*\n)*\s*0\s*\r?\n\s*SECTION\b", data)
-        is not None
-    )
+    section = rb"(\xef\xbb\xbf)?(\s*999\r?\n[^\n]*\n)*\s*0\s*\r?\n\s*SECTION\b"
+    return data.startswith(b"AutoCAD Binary DXF") or re.match(section, data) is not None
 
 
 def drawing_of(file: File) -> Drawing:
@@ -84,14 +81,10 @@ def drawing_of(file: File) -> Drawing:
     header, entities = _read(file)
     stated, size = _UNITS.get(header, ("", None))
     notes = []
-    if (
-        size is not None
-        and file.unit
-        and not math.isclose(size, to_si(f"1 {file.unit}", "m"), rel_tol=1e-9)
-    ):
-        notes.append(
-            f"The drawing states {stated} ($INSUNITS = {header}), and --unit {file.unit} is used: check the largest length"
-        )
+    given = to_si(f"1 {file.unit}", "m") if file.unit else size
+    if size is not None and given is not None and not math.isclose(size, given, rel_tol=1e-9):
+        used = f"--unit {file.unit} is used: check the largest length"
+        notes.append(f"The drawing states {stated} ($INSUNITS = {header}), and {used}")
         size = None  # programs state the unit of their template, whatever was drawn
     scale = file.scale(size, stated, f", $INSUNITS = {header}")
     bodies, left = _bodies(list(_joined(entities)), file)
@@ -110,14 +103,12 @@ def drawing_of(file: File) -> Drawing:
     for name, body in bodies.items():
         for k in {at[place] for place in body.points}:
             owners[k].append(name)
-    points = [
-        _point(DrawnPoint(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, file)
-        for k, (place, own) in enumerate(zip(places, owners, strict=True), 1)
-    ]
-    points = [
-        one._replace(x=round(scale * one.x, 12), y=round(scale * one.y, 12)) for one in points
-    ]
-    return Drawing([one for one in points if one.bodies != (GROUND,)], {}, [*notes, *left])
+    points = []
+    for k, (place, own) in enumerate(zip(places, owners, strict=True), 1):
+        one = _point(DrawnPoint(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, file)
+        if one.bodies != (GROUND,):
+            points.append(one.at(scale, *place))
+    return Drawing(points, {}, [*notes, *left])
 
 
 def _read(file: File) -> tuple[int, list[_Entity]]:
@@ -216,11 +207,9 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
     if len(heights) > 1:
         notes.append(f"Left out: heights of {min(heights):g} to {max(heights):g} along z")
     for words, texts in (("Not read", False), ("Left out", True)):
-        counted = [
-            f"{count} {kind}" for kind, count in left.items() if count and (kind in _TEXTS) == texts
-        ]
-        if counted:
-            notes.append(f"{words}: {listed(counted)}")
+        kinds = [kind for kind, count in left.items() if count and (kind in _TEXTS) == texts]
+        if kinds:
+            notes.append(f"{words}: {listed(f'{left[kind]} {kind}' for kind in kinds)}")
     return bodies, [*notes, *given.notes()]
 
 
@@ -237,9 +226,7 @@ def _add(body: _Body, one: _Entity, file: File) -> None:
     body.lines |= dict.fromkeys(itertools.pairwise(places))
 
 
-def _distinct(
-    places: Sequence[Place], size: float, file: File
-) -> tuple[list[Place], dict[Place, int]]:
+def _distinct(every: list[Place], size: float, file: File) -> tuple[list[Place], dict[Place, int]]:
     """Each place once, and which of them each is; places that are neither one nor two are refused.
 
     Places are kept in squares, so that those beside one are found without a look at all.
@@ -247,11 +234,10 @@ def _distinct(
     made, at = list[Place](), dict[Place, int]()
     squares: dict[tuple[int, int], list[int]] = {}
     side = _NEAR * size or 1.0
-    for place in dict.fromkeys(places):
+    for place in dict.fromkeys(every):
         i, j = math.floor(place[0] / side), math.floor(place[1] / side)
-        beside = [
-            k for m in (-1, 0, 1) for n in (-1, 0, 1) for k in squares.get((i + m, j + n), ())
-        ]
+        near_by = itertools.product((i - 1, i, i + 1), (j - 1, j, j + 1))
+        beside = [k for square in near_by for k in squares.get(square, ())]
         gap, k = min(((math.dist(place, made[k]), k) for k in beside), default=(math.inf, 0))
         if _SAME * size < gap < _NEAR * size:
             near = made[k]

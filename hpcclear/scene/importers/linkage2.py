@@ -8,7 +8,7 @@ shows. A positive speed is clockwise.
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
@@ -57,6 +57,11 @@ class _Connector:
         return self.row.get(key) == "true"
 
 
+Connectors = Mapping[str, _Connector]
+Bodies = dict[str, list[str]]
+"""Connectors by the names of bodies."""
+
+
 def drawing_of(file: File) -> Drawing:
     """Pins, sliders, anchors and rotating inputs of a document; raises InputError where it cannot be read in full."""
     root = _root(file)
@@ -82,13 +87,10 @@ def drawing_of(file: File) -> Drawing:
         if one.has("input"):
             if not one.row.get("rpm"):
                 unstated.append(one.name)
-            speeds[_driven(one, file)] = -file.number(
-                one.row.get("rpm") or _SPEED, f"the rpm of {one.name}"
-            )
-    notes = [
-        f"Lengths are those that the program shows, in {shown.lower()}: compare one",
-        *_left(root, lone),
-    ]
+            speed = one.row.get("rpm") or _SPEED
+            speeds[_driven(one, file)] = -file.number(speed, f"the rpm of {one.name}")
+    notes = [f"Lengths are those that the program shows, in {shown.lower()}: compare one"]
+    notes += _left(root, lone)
     if unstated:
         notes.append(f"Inputs without a speed turn at {_SPEED} rpm: {listed(unstated)}")
     return Drawing(points, speeds, [*notes, *names[0].notes(), *names[1].notes()])
@@ -133,10 +135,10 @@ def _is_drawing(row: ElementTree.Element) -> bool:
     return row.get("layer") == str(_DRAWING_LAYER) or row.get("measurementelement") == "true"
 
 
-def _refuse(row: ElementTree.Element, file: File) -> None:
-    """InputError where an element has what no scene can have."""
+def _refuse(row: ElementTree.Element, file: File, has: str = "") -> None:
+    """InputError where an element has what no scene can have, by its attributes, or as stated."""
     for word, (what, remedy) in _REFUSED.items():
-        if row.get(word, "false") not in ("false", ""):
+        if row.get(word, "false") not in ("false", "") or word == has:
             file.refuse(f"{row.tag} {row.get('id')}"[:40], f"the document has {what}", remedy)
 
 
@@ -158,19 +160,15 @@ def _connectors(root: ElementTree.Element, file: File, names: Names) -> dict[str
     return found
 
 
-def _links(
-    root: ElementTree.Element, connectors: Mapping[str, _Connector], file: File, names: Names
-) -> dict[str, list[str]]:
+def _links(root: ElementTree.Element, connectors: Connectors, file: File, names: Names) -> Bodies:
     """Connectors of each body; a link with two anchors belongs to the ground."""
-    bodies: dict[str, list[str]] = {GROUND: []}
+    bodies: Bodies = {GROUND: []}
     for row in [row for tag in _LINKS for row in root.findall(tag)]:
         own = list(dict.fromkeys(c.get("id", "") for c in row.findall("connector")))
         if _is_drawing(row):
             continue
-        _refuse(row, file)
-        if any(c.get("id") in connectors for c in row.findall("fastenconnector")):
-            what, remedy = _REFUSED["fastenconnector"]
-            file.refuse(f"link {row.get('id')}"[:40], f"the document has {what}", remedy)
+        fastened = any(c.get("id") in connectors for c in row.findall("fastenconnector"))
+        _refuse(row, file, "fastenconnector" if fastened else "")
         lost = next((c for c in own if c not in connectors), None)
         if lost is not None:
             reason = f"has the connector {lost[:40]}, which is not in the document or is of its drawing layer"
@@ -192,13 +190,9 @@ def _links(
 
 
 def _point(
-    one: _Connector,
-    connectors: Mapping[str, _Connector],
-    bodies: Mapping[str, Sequence[str]],
-    size: float,
-    file: File,
+    one: _Connector, connectors: Connectors, bodies: Bodies, size: float, file: File
 ) -> DrawnPoint:
-    made = DrawnPoint(one.name, round(size * one.x, 12), round(size * one.y, 12), tuple(one.links))
+    made = DrawnPoint(one.name, 0.0, 0.0, tuple(one.links)).at(size, one.x, one.y)
     limits = [limit.get("id", "") for limit in one.row.findall("slidelimit")]
     if not one.has("slider") or len(limits) < 2:
         return made

@@ -95,15 +95,11 @@ def _project(query: str, file: File) -> Drawing:
         file.refuse(wrong[:40], reason, "Export it with an older version, or as CSV")
     links = [_link(row, file) for row in rows if row[0] in _ROOTS]
     welded = {member for link in links for member in link.members}
-    alone = [
-        one for row in rows if row[0] in _MEMBERS and (one := _link(row, file)).key not in welded
-    ]
-    if alone:
-        reason = "is part of a welded link that is not in the file"
-        file.refuse(alone[0].key, reason)
-    speed = abs(_number(integers.split(",")[0], file)) * (
-        -1.0 if _number(flags, file, plain=True) & 1 else 1.0
-    )
+    parts = (_link(row, file).key for row in rows if row[0] in _MEMBERS)
+    for key in (one for one in parts if one not in welded):
+        file.refuse(key, "is part of a welded link that is not in the file")
+    sense = -1.0 if _number(flags, file, plain=True) & 1 else 1.0
+    speed = sense * abs(_number(integers.split(",")[0], file))
     length = int(kinds[0]) if kinds[:1] in tuple("0123456789") else len(_LENGTHS)
     stated = _LENGTHS[length] if length < len(_LENGTHS) else ""
     size = file.scale(to_si(f"1 {stated}", "m") if stated else None, stated)
@@ -168,21 +164,16 @@ def _table(text: str, file: File) -> Drawing:
         file.refuse("table", f"cannot be read ({error})")
     limit(max(map(len, rows.values()), default=0) // 2, file.key)
     joints = [_joint_of(row, file) for row in rows.get("j", [])[1:]]
-    links = [
-        _Link(row[0], row[1], False, _ids(row, 6, file))
-        for row in rows.get("l", [])[1:]
-        if _ids(row, 6, file)
-    ]
+    owns = [(row, _ids(row, 6, file)) for row in rows.get("l", [])[1:]]
+    links = [_Link(row[0], row[1], False, own) for row, own in owns if own]
     for row in rows.get("c", [])[1:]:
         parts = _ids(row, 5, file)
-        members = [one for one in links if one.key in parts]
+        members = {one.key: one for one in links if one.key in parts}
         if len(members) < len(parts):
             file.refuse(",".join(row)[:40], "is welded of links that are not in the file")
-        joined = tuple(dict.fromkeys(joint for one in members for joint in one.joints))
-        links = [one for one in links if one not in members]
-        links.append(
-            _Link(f"welded {row[0]}", row[1], False, joined, tuple(one.key for one in members))
-        )
+        joined = tuple(dict.fromkeys(k for one in members.values() for k in one.joints))
+        links = [one for one in links if one.key not in members]
+        links.append(_Link(f"welded {row[0]}", row[1], False, joined, tuple(members)))
     notes = ["The file does not state the unit of lengths, nor whether the input turns clockwise"]
     kinds = (("f", "forces"), ("p", "positions of a synthesis"), ("t", "trajectories"))
     left = [f"{count} {words}" for kind, words in kinds if (count := len(rows.get(kind, [])[1:]))]
@@ -200,17 +191,12 @@ def _ids(row: Sequence[str], place: int, file: File) -> tuple[str, ...]:
 def _joint_of(row: Sequence[str], file: File) -> _Joint:
     if len(row) < 9:
         file.refuse(",".join(row)[:40], "is no joint")
-    x, y, angle = (
-        file.number(row[k], f"a place or angle of joint {row[1][:40]}") for k in (2, 3, 5)
-    )
-    turned, welded = row[7] == "true", row[9:10] == ["true"]
-    flags = (
-        _PRISMATIC * (row[4] == "0")
-        + _INPUT * turned
-        + _GROUNDED * (row[6] == "true")
-        + _WELDED * welded
-    )
-    speed = file.number(row[8] or "0", f"the speed of joint {row[1][:40]}") if turned else 0.0
+    joint = f"joint {row[1][:40]}"
+    x, y, angle = (file.number(row[k], f"a place or angle of {joint}") for k in (2, 3, 5))
+    turned = row[7] == "true"
+    flags = _PRISMATIC * (row[4] == "0") + _INPUT * turned
+    flags += _GROUNDED * (row[6] == "true") + _WELDED * (row[9:10] == ["true"])
+    speed = file.number(row[8] or "0", f"the speed of {joint}") if turned else 0.0
     return _Joint(row[0], row[1], x, y, flags, math.radians(angle), speed=speed)
 
 
@@ -242,13 +228,8 @@ def _sliders(joints: Sequence[_Joint], links: Sequence[_Link], file: File) -> li
 
 
 def _drawing(
-    joints: Sequence[_Joint],
-    links: Sequence[_Link],
-    speed: float,
-    size: float,
-    file: File,
-    notes: list[str],
-) -> Drawing:
+    joints: Sequence[_Joint], links: Sequence[_Link], speed: float, size: float, file: File, notes: list[str],
+) -> Drawing:  # fmt: skip
     by_key = {one.key: one for one in joints}
     if len(by_key) < len(joints):
         file.refuse(len(joints), "two joints have the same letter")
@@ -278,33 +259,23 @@ def _drawing(
                 reason = "the input is not on the ground"
                 file.refuse(one.name[:40], reason, "Drive a crank on the ground there")
             if len(own[one.key]) > 1:
-                notes.append(
-                    f"Input {one.name} turns {own[one.key][0]}, the first of {listed(own[one.key])}"
-                )
-        pins = (
-            (GROUND, *own[one.key]) if one.flags & _GROUNDED and not slides else tuple(own[one.key])
-        )
-        name = given.given(one.name, one.key)
-        point = DrawnPoint(name, round(size * one.x, 12), round(size * one.y, 12), pins)
+                first, every = own[one.key][0], listed(own[one.key])
+                notes.append(f"Input {one.name} turns {first}, the first of {every}")
+        still = one.flags & _GROUNDED and not slides
+        pins = (*([GROUND] if still else []), *own[one.key])
+        point = DrawnPoint(given.given(one.name, one.key), 0.0, 0.0, pins).at(size, one.x, one.y)
         points.append(_sliding(point, one, by_key, bodies, file) if slides else point)
     if alone:
         notes.append(f"Not read: joints without a link: {listed(alone)}")
     if not all(speeds.values()):
         file.refuse("input", "an input has the speed 0", "Give it a speed there")
-    return Drawing(
-        points,
-        speeds,
-        [*notes, "Masses of the file are not taken over", *names.notes(), *given.notes()],
-    )
+    notes = [*notes, "Masses of the file are not taken over", *names.notes(), *given.notes()]
+    return Drawing(points, speeds, notes)
 
 
 def _sliding(
-    point: DrawnPoint,
-    joint: _Joint,
-    joints: Mapping[str, _Joint],
-    bodies: Mapping[str, str],
-    file: File,
-) -> DrawnPoint:
+    point: DrawnPoint, joint: _Joint, joints: Mapping[str, _Joint], bodies: Mapping[str, str], file: File,
+) -> DrawnPoint:  # fmt: skip
     """The point with its line; a welded joint keeps its own link from turning."""
     angle, guide = joint.angle, GROUND
     if joint.slot:

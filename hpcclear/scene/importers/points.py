@@ -38,6 +38,10 @@ class DrawnPoint(NamedTuple):
     block: str = ""
     """Body that slides without turning against the guide; "" for one that has this point alone, or a new one."""
 
+    def at(self, size: float, x: float, y: float) -> "DrawnPoint":
+        """The point at a place in a unit of a size, m."""
+        return self._replace(x=round(size * x, 12), y=round(size * y, 12))
+
 
 class Drawing(NamedTuple):
     """A linkage that a file holds."""
@@ -119,23 +123,19 @@ def summary(content: Content, drawing: Drawing) -> list[tuple[str, str]]:
     """Return what a scene has of a file, and what it leaves, as labels and texts."""
     mechanism = content["mechanism"]
     drives = [f"{row['body']} at {row['speed']}" for row in mechanism["drives"].values()]
-    kinds = [
-        f"{name} ({'guide' if row['kind'] == 'slide' else 'pin'})"
-        for name, row in mechanism["joints"].items()
-    ]
-    length = max(
-        ((math.dist(a[1:3], b[1:3]), name, a.name, b.name)
-         for name, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)),
-        default=None,
-    )  # fmt: skip
+    rows = mechanism["joints"].items()
+    kinds = [f"{name} ({'guide' if row['kind'] == 'slide' else 'pin'})" for name, row in rows]
     stated = "" if drawing.speeds else ", a placeholder: the file states no drive"
     lines = [
         ("bodies", listed(mechanism["bodies"])),
         ("joints", listed(kinds)),
         ("drives", listed(drives) + stated + _repeating(mechanism["drives"])),
     ]
-    if length is not None:
-        size, body, first, second = length
+    lengths = [
+        (math.dist(a[1:3], b[1:3]), body, a.name, b.name)
+        for body, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)
+    ]  # fmt: skip
+    for size, body, first, second in sorted(lengths)[-1:]:
         text = f"at most {1e3 * size:.6g} mm, from {first} to {second} of {body}"
         lines.append(("length", text))
     return lines + [("note", note) for note in drawing.notes]
@@ -154,19 +154,14 @@ def _checked(points: Sequence[DrawnPoint], key: str) -> Sequence[DrawnPoint]:
 
 def _driven(points: Sequence[DrawnPoint], names: Sequence[str], key: str) -> str:
     """The first body that turns about a pin of the ground."""
-    pinned = {
-        name for one in points if GROUND in one.bodies and one.slide is None for name in one.bodies
-    }
+    pins = [one.bodies for one in points if GROUND in one.bodies and one.slide is None]
     for name in names:
-        if name in pinned:
+        if any(name in bodies for bodies in pins):
             return name
     reason = "the file states no drive, and no body turns about a pin of the ground"
     remedy = "Drive a crank on the ground"
-    slides = (one for one in points if one.slide is not None)
-    if GROUND not in {
-        *(name for one in points for name in one.bodies),
-        *(one.guide for one in slides),
-    }:
+    slides = [one.guide for one in points if one.slide is not None]
+    if not any(GROUND in one.bodies for one in points) and GROUND not in slides:
         reason = "no body is pinned to the ground"
         remedy = 'Name the body "ground" at points that stand still'
     raise InputError(key, listed(names), reason, remedy)
@@ -201,10 +196,8 @@ class _Frame(NamedTuple):
         """Place of a point in these axes, m."""
         dx, dy = point.x - self.x, point.y - self.y
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
-        return [
-            0.0 + round(dx * cosine + dy * sine, 12),
-            0.0 + round(dy * cosine - dx * sine, 12),
-        ]  # no -0
+        place = dx * cosine + dy * sine, dy * cosine - dx * sine
+        return [0.0 + round(one, 12) for one in place]  # no -0
 
 
 def _by_body(points: Sequence[DrawnPoint]) -> dict[str, list[DrawnPoint]]:

@@ -38,9 +38,8 @@ class CylinderLoad(Load):
     def act(self, on: Acting) -> Term:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
-        nx, ny, length, rate = on.call(
-            along, *apart, *moving, results=("nx", "ny", "length", "rate")
-        )
+        made = ("nx", "ny", "length", "rate")
+        nx, ny, length, rate = on.call(along, *apart, *moving, results=made)
         if isinstance(self.force, tuple):
             push = on.piecewise(self.force, length, rate)
         else:

@@ -154,8 +154,6 @@ class SizedLoad(Load):
         if timed is None:
             raise invalid(f"there is no {entry}_by_time", "Remove it", "repeats")
         if timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]:
-            reason = (
-                "a table that repeats begins at 0 s, and ends at the value with which it begins"
-            )
+            reason = "a table that repeats begins at 0 s, and ends at the value of its beginning"
             remedy = "Make its first and last value equal"
             raise invalid(reason, remedy, f"{entry}_by_time")

@@ -25,9 +25,7 @@ class DragLoad(Load):
 
     def act(self, on: Acting) -> Term:
         """The torque."""
-        spin = on.spin(self.body)
-        (torque,) = on.call(
-            drag, on.parameter("linear"), on.parameter("quadratic"), spin, results=("drag",)
-        )
+        spin, own = on.spin(self.body), (on.parameter("linear"), on.parameter("quadratic"))
+        (torque,) = on.call(drag, *own, spin, results=("drag",))
         on.twist(self.body, torque)
         return torque * spin
