@@ -210,7 +210,7 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
     mpi, (variable, copies) = _load_mpi(), launcher.launched_size()
     if mpi.Is_finalized():  # by an earlier call in this process, and MPI starts only once
         if copies > 1:  # which do not find each other without it
-            reason = "this process left MPI after an earlier run, and MPI cannot be started twice"
+            reason = "this process has left MPI after an earlier run, and it cannot start twice"
             remedy = "Import mpi4py.MPI at the top of the script, which keeps MPI until its end"
             raise InputError(variable, copies, reason, remedy)
         return Mail()

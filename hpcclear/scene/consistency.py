@@ -79,11 +79,9 @@ class ConsistentTables(SceneTables):
         for entry in ("slider_load", "guide_friction"):
             value = getattr(self.effects, entry)
             if self.template is None and value is not None:
-                raise invalid(
-                    "belongs to a slider-crank",
-                    "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
-                    key=f"effects.{entry}",
-                )
+                friction = "friction as an entry of a slide in [mechanism.joints.NAME]"
+                remedy = f"Write a load in [mechanism.loads.NAME], {friction}"
+                raise invalid("belongs to a slider-crank", remedy, f"effects.{entry}")
         if self.template is not None:
             self._check_template()
 

@@ -57,10 +57,9 @@ def _drive(scene: SceneTables) -> Iterator[str]:
     turns = speed / (2.0 * math.pi)
     mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:
-        yield (
-            f"drive.{key} = {scene.shown(f'drive.{key}')} is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; "
-            f'engines stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
-        )
+        size = f"{60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s"
+        remedy = f'engines stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
+        yield f"drive.{key} = {scene.shown(f'drive.{key}')} is {size}; {remedy}"
 
 
 def _bodies(scene: SceneTables) -> Iterator[str]:
@@ -69,19 +68,17 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
     for key, length in lengths.items():
         own, share = bodies[key].own_inertia, bodies[key].own_inertia / bodies[key].mass / length**2
         if share > 100.0:
-            yield (
-                f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {share:.2g} times mass times "
-                "length squared; check the unit, or give a flywheel as flywheel_inertia of a drive"
-            )
+            size = f"{scene.in_unit(own, 'kg*m**2')} is {share:.2g} times mass times length squared"
+            remedy = "check the unit, or give a flywheel as flywheel_inertia of a drive"
+            yield f"{key}.inertia = {size}; {remedy}"
     places = [*scene.linkage.ground.points, *(one for b in bodies.values() for one in b.points)]
     sizes = [*lengths.values(), *(math.hypot(one.x, one.y) for one in places)]
     heaviest = 5.0 * STEEL * (max(sizes, default=0.0) or math.inf) ** 3
     for key, body in bodies.items():
         if body.mass > heaviest:
-            yield (
-                f"{key}.mass = {scene.shown(f'{key}.mass')} is more than five steel cubes as long as the mechanism "
-                f'({heaviest:.3g} kg); if grams are meant, write "{body.mass:g} g"'
-            )
+            size = f"more than five steel cubes as long as the mechanism ({heaviest:.3g} kg)"
+            remedy = f'if grams are meant, write "{body.mass:g} g"'
+            yield f"{key}.mass = {scene.shown(f'{key}.mass')} is {size}; {remedy}"
 
 
 def _rod(scene: SceneTables) -> Iterator[str]:
@@ -94,30 +91,28 @@ def _rod(scene: SceneTables) -> Iterator[str]:
     inertia = (rod.mass + mechanism.slider.mass) * mechanism.crank.length * speed**2
     buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
     if inertia > 0.5 * buckling:
-        yield (
-            f"mechanism.rod.bending.stiffness = {scene.shown('mechanism.rod.bending.stiffness')} buckles under "
-            f"{buckling:.3g} N, and the inertia of rod and slider comes to {inertia:.3g} N; deflections are large there"
+        key = "mechanism.rod.bending.stiffness"
+        load = (
+            f"the inertia of rod and slider comes to {inertia:.3g} N; deflections are large there"
         )
+        yield f"{key} = {scene.shown(key)} buckles under {buckling:.3g} N, and {load}"
 
 
 def _joints(scene: SceneTables) -> Iterator[str]:
     for name in scene.pins():
-        pin, key = scene.pin(name), scene.joint_key(name)
-        if pin.clearance > WIDEST * pin.bearing_radius:
-            yield (
-                f"{key}.clearance = {scene.shown(f'{key}.clearance')} is "
-                f"{100 * pin.clearance / pin.bearing_radius:.0f} % of the bearing's radius; "
-                "write the radial clearance, half of the difference of the diameters"
-            )
+        pin, key = scene.pin(name), f"{scene.joint_key(name)}.clearance"
+        if (share := pin.clearance / pin.bearing_radius) > WIDEST:
+            size = f"{scene.shown(key)} is {100 * share:.0f} % of the bearing's radius"
+            remedy = "write the radial clearance, half of the difference of the diameters"
+            yield f"{key} = {size}; {remedy}"
     for name, film in scene.films().items():
         key = f"{scene.joint_key(name)}.film"
         ratio = 0.5 * film.length / scene.pin(name).bearing_radius
         least, most = film.law.lengths
         if not least <= ratio <= most:
-            yield (
-                f'{key}.model = "{film.model}" overestimates the load capacity of a bearing {ratio:.2g} diameters long. '
-                f'It is for {film.law.valid}; model = "finite" covers all lengths'
-            )
+            what = f"the load capacity of a bearing {ratio:.2g} diameters long"
+            remedy = f'It is for {film.law.valid}; model = "finite" covers all lengths'
+            yield f'{key}.model = "{film.model}" overestimates {what}. {remedy}'
 
 
 TITLE = (
@@ -214,32 +209,25 @@ def warnings(scene: SceneTables) -> Iterator[str]:
         key = scene.path_in_scene(f"mechanism.bodies.{bar.name}")
         least = slender_inertia(bar.mass, bar.length)
         if 0.0 < bar.own_inertia < least * (1 - 1e-12):
-            yield (
-                f"{key}.inertia = {scene.in_unit(bar.own_inertia, 'kg*m**2')} is less than a thin uniform "
-                f"rod of that mass and length has ({scene.in_unit(least, 'kg*m**2')})"
-            )
-        if not 0 <= (0.0 if bar.mass_center is None else bar.mass_center) <= bar.length:
-            yield (
-                f"{key}.mass_center = {scene.shown(f'{key}.mass_center')} lies beyond the pins, "
-                f"which are at 0 and {scene.shown(f'{key}.length')}"
-            )
+            given, thin = (scene.in_unit(one, "kg*m**2") for one in (bar.own_inertia, least))
+            rod = f"a thin uniform rod of that mass and length has ({thin})"
+            yield f"{key}.inertia = {given} is less than {rod}"
+        if not 0 <= (bar.mass_center or 0.0) <= bar.length:
+            place, end = (scene.shown(f"{key}.{entry}") for entry in ("mass_center", "length"))
+            yield f"{key}.mass_center = {place} lies beyond the pins, which are at 0 and {end}"
     for name in scene.pins():
-        joint = scene.pin(name)
+        joint, entry = scene.pin(name), f"{scene.joint_key(name)}.start_eccentricity"
         start = joint.start_eccentricity
         if start.x**2 + start.y**2 > joint.clearance**2 * (1 + 1e-12):
-            yield (
-                f"{scene.joint_key(name)}.start_eccentricity lies outside the clearance, "
-                "so the run starts in contact"
-            )
+            yield f"{entry} lies outside the clearance, so the run starts in contact"
     for variable in scene.study.variables if scene.study is not None else ():
         own = [scene.number(path) for path in variable.paths]
         low, high = variable.range or (-math.inf, math.inf)
         if not all(low <= value <= high for value in own):
-            ends = [scene.shown(variable.paths[0], end) for end in (low, high)]
-            yield (
-                f"study.variables.{variable.name} runs from {' to '.join(ends)}, and the scene's own value "
-                f"{scene.shown(variable.paths[0])} lies outside"
-            )
+            path, key = variable.paths[0], f"study.variables.{variable.name}"
+            ends = " to ".join(scene.shown(path, end) for end in (low, high))
+            outside = f"the scene's own value {scene.shown(path)} lies outside"
+            yield f"{key} runs from {ends}, and {outside}"
     yield from unused(scene)
 
 
@@ -251,10 +239,9 @@ def unused(scene: SceneTables) -> Iterator[str]:
     if study is None or study.groups or study.sensitivity.groups == ():
         return
     if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own
-        yield (
-            "study.sensitivity is not used: no group of variables is named, and these variables have no usual groups. "
-            "Name them in study.sensitivity.groups, and the fixed one in study.sensitivity.parameter"
-        )
+        why = "no group of variables is named, and these variables have no usual groups"
+        remedy = "Name them in study.sensitivity.groups, and the fixed one in study.sensitivity.parameter"
+        yield f"study.sensitivity is not used: {why}. {remedy}"
 
 
 def _entry(scene: SceneTables, key: str, entries: Mapping[str, object]) -> str:
@@ -271,11 +258,8 @@ def differences(first: SceneTables, second: SceneTables) -> list[str]:
         for key in entries:
             if key.startswith("plugins.files."):
                 entries[key] = f"SHA-256 {digest(entries[key])}"
-    lines = [
-        f"{key}: {_entry(first, key, ours)} -> {_entry(second, key, theirs)}"
-        for key in {**ours, **theirs}
-        if ours.get(key) != theirs.get(key)
-    ]
+    keys = [key for key in {**ours, **theirs} if ours.get(key) != theirs.get(key)]
+    lines = [f"{k}: {_entry(first, k, ours)} -> {_entry(second, k, theirs)}" for k in keys]
     if not lines and first.hash != second.hash:
         lines.append("study: the order of variables or random inputs")
     return lines

@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.named import Range
 from hpcclear.scene.planar import slender_inertia
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
@@ -62,11 +63,10 @@ def bound_at(share: float) -> str:
     return "lower" if abs(share) < ON_BOUND else "upper" if abs(share - 1.0) < ON_BOUND else ""
 
 
-def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float]]:
+def _reaches(study: Study, widen: Iterable[str]) -> dict[str, Range]:
     """How far each path moves below and above its design value."""
-    rows = [study.random_input(name) for name in widen]
-    found: dict[str, tuple[float, float]] = {}
-    for row in rows:
+    found: dict[str, Range] = {}
+    for row in map(study.random_input, widen):
         if not row.absolute:
             low, high = study.reach(row)
             found |= dict.fromkeys(row.paths, (min(low, 0.0), max(high, 0.0)))
@@ -74,11 +74,8 @@ def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float
 
 
 def _bounds(
-    scene: SceneTables,
-    variable: StudyVariable,
-    names: tuple[str, ...],
-    reach: dict[str, tuple[float, float]],
-) -> tuple[float, float]:
+    scene: SceneTables, variable: StudyVariable, names: tuple[str, ...], reach: Mapping[str, Range]
+) -> Range:
     lower, upper = variable.bounds
     if not variable.paths:
         return lower, upper
@@ -104,7 +101,7 @@ def _bounds(
     return min(ratios), max(ratios)
 
 
-def _span(scene: SceneTables, path: str, names: tuple[str, ...]) -> tuple[float, float]:
+def _span(scene: SceneTables, path: str, names: tuple[str, ...]) -> Range:
     """Range of the design values at a path: its variable's, if that is among `names`, else the
     scene's."""
     for name in names:
@@ -147,10 +144,6 @@ def slender_inertias(
     `values` has shape ``(n, d)``, and column i drives the scene entries ``paths[i]``; mass and
     length come from the row where a column drives them, and from the scene where none does.
     """
-    columns = {path: column for column, driven in enumerate(paths) for path in driven}
-    link = inertia.rpartition(".")[0]
-    mass, length = (
-        values[:, columns[path]] if path in columns else scene.number(path)
-        for path in (f"{link}.mass", f"{link}.length")
-    )
-    return slender_inertia(mass, length)
+    columns = {path: values[:, k] for k, driven in enumerate(paths) for path in driven}
+    of_link = [f"{inertia.rpartition('.')[0]}.{part}" for part in ("mass", "length")]
+    return slender_inertia(*(columns[p] if p in columns else scene.number(p) for p in of_link))

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
-from hpcclear.scene.fields import Angle, Count, Quantity, Table, check_one_of, invalid
+from hpcclear.scene.fields import Angle, Count, Quantity, Table, invalid
 
 Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
@@ -213,7 +213,7 @@ class CrankTorque(Table):
             remedy = 'Write about how fast it will turn, such as expected_speed = "1500 rpm"'
             raise invalid(reason, remedy, "expected_speed")
         remedy = "Write torque, or torque_by_speed = [[speed, torque], ...]"
-        check_one_of("torque", self.torque, self.torque_by_speed, remedy)
+        self.check_one_of(remedy, "torque", "torque_by_speed")
         if self.torque_by_speed is not None and self.no_load_speed is not None:
             reason = "torque_by_speed says already how the torque falls"
             raise invalid(reason, "Remove it", "no_load_speed")
@@ -296,7 +296,5 @@ class PlanarRunUp(FreeDriving):
             raise invalid(reason, "Give speeds above 0 from the second row on", "speed_by_time")
 
 
-PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp | PlanarFree,
-    Field(discriminator="kind"),
-]
+_Known = PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp | PlanarFree
+PlanarDrive = Annotated[_Known, Field(discriminator="kind")]

@@ -76,12 +76,6 @@ def check_known(name: str, known: Collection[str], reason: str, key: str = "") -
         raise invalid(f"{name!r} {reason}", nearest(name, tuple(known)), key)
 
 
-def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
-    """An error for validators unless just one of the two is given; `key` is that of `value`."""
-    if (value is None) == (other is None):
-        raise invalid("is given twice or not at all", remedy, key=key, value=value)
-
-
 def checked_table(data: object) -> Mapping[str, object]:
     """A table whose keys are strings; an error for validators where it is none."""
     if not isinstance(data, Mapping):
@@ -137,6 +131,12 @@ class Table(BaseModel):
                 except InputError as error:
                     error.value = self._held(error.key) if error.value is ... else error.value
                     raise
+
+    def check_one_of(self, remedy: str, key: str, *others: str) -> None:
+        """An error for validators unless an entry is given or one of the others is, and not both."""
+        given, other = (any(getattr(self, k) is not None for k in own) for own in ((key,), others))
+        if given == other:
+            raise invalid("is given twice or not at all", remedy, key)
 
     def _held(self, key: str) -> object:
         """A number or text at a dotted key, which may be a default that no file has; `...` for anything else."""

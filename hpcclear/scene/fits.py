@@ -213,11 +213,9 @@ def law_of(entries: Content) -> tolerances.FitClearance:
     for name, part in (("bore", "hole"), ("pin", "shaft")):
         tolerance, limits = Tolerance(**entries.get(name, {})), fit and fit.diameters(part)
         if tolerance.range is None and limits is None:
-            raise invalid(
-                "its limits of size are not known",
-                f'Add fit = "20 H7/f7", give the joint a fit, or write {name} = {{ range = [smallest, largest] }}',
-                name, entries.get(name),
-            )  # fmt: skip
+            reason = "its limits of size are not known"
+            remedy = f"give the joint a fit, or write {name} = {{ range = [smallest, largest] }}"
+            raise invalid(reason, f'Add fit = "20 H7/f7", {remedy}', name, entries.get(name))
         parts.append(tolerance.part(limits))
     bore, pin = parts
     law = tolerances.FitClearance(bore, pin, *entries.get("range", (-float("inf"), float("inf"))))
@@ -241,12 +239,12 @@ def with_clearance(joint: Mapping[str, Any]) -> Content:
         with at("fit", joint["fit"]):
             fit = fit_of(joint["fit"])
         made |= {"clearance": fit.clearance, "bearing_radius": fit.bearing_radius}
-        low, high = (1e6 * one for one in fit.clearances)
-        note(
-            joint["fit"],
-            f"a radial clearance of {low:.4g} to {high:.4g} um, here {1e6 * fit.clearance:.4g} um, "
-            f"and a bearing radius of {1e3 * fit.bearing_radius:.8g} mm",
+        low, middle, high = (
+            1e6 * one for one in (fit.clearances[0], fit.clearance, fit.clearances[1])
         )
+        clearance = f"a radial clearance of {low:.4g} to {high:.4g} um, here {middle:.4g} um"
+        radius = f"a bearing radius of {1e3 * fit.bearing_radius:.8g} mm"
+        note(joint["fit"], f"{clearance}, and {radius}")
     if "diametral_clearance" in joint:
         diametral = _DIAMETER.convert(joint["diametral_clearance"], "diametral_clearance")
         made["clearance"] = diametral / 2

@@ -57,12 +57,10 @@ _SEEN: dict[str, str] = {}
 def of_kinds(content: Tables) -> Iterator[None]:
     """Within it, `quantities` knows the kinds of the loads of a scene's content, on which units of their entries depend."""
     mechanism = content.get("mechanism")
-    rows = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
-    found = {
-        f"mechanism.loads.{name}": str(row.get("kind"))
-        for name, row in (rows.items() if isinstance(rows, Mapping) else ())
-        if isinstance(row, Mapping)
-    }
+    loads = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
+    rows = loads.items() if isinstance(loads, Mapping) else ()
+    kinds = {name: str(row.get("kind")) for name, row in rows if isinstance(row, Mapping)}
+    found = {f"mechanism.loads.{name}": kind for name, kind in kinds.items()}
     _SEEN.update(found)
     token = _kinds.set(found)
     try:
@@ -92,12 +90,12 @@ def _all_entries() -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:
 @lru_cache(maxsize=1)
 def curves() -> Mapping[str, Pairs]:
     """Tables of pairs that may come from a file, by path, such as "mechanism.drives.*.torque"."""
-    return {
-        path: part
-        for path, field, _ in _all_entries()
-        for part in (*field.metadata, *_parts(field.annotation))
-        if isinstance(part, Pairs) and part.most > MOST_ROWS
-    }
+    found = {}
+    for path, field, _ in _all_entries():
+        for part in (*field.metadata, *_parts(field.annotation)):
+            if isinstance(part, Pairs) and part.most > MOST_ROWS:
+                found[path] = part
+    return found
 
 
 def curve_at(path: str) -> Pairs | None:

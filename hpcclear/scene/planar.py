@@ -47,16 +47,13 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
         reason = "only a bar can bend, and this body has no length"
         raise invalid(reason, "Give its length, or leave bending out")
     if body.points:
-        raise invalid(
-            f"the bar has a further point, {body.points[0].name}, but bending is modelled for its two ends only",
-            "Leave out its points, or bending",
-        )
+        further = f"the bar has a further point, {body.points[0].name}"
+        reason = f"{further}, but bending is modelled for its two ends only"
+        raise invalid(reason, "Leave out its points, or bending")
     for row in planar.drives:
         if row.body == body.name:
-            raise invalid(
-                f"{row.name} drives the bar and clamps it, but the modes are those of pinned ends",
-                "Leave bending out, or drive another body",
-            )
+            reason = f"{row.name} drives the bar and clamps it, but the modes are of pinned ends"
+            raise invalid(reason, "Leave bending out, or drive another body")
     for row in planar.loads:
         if getattr(row, "body", None) == body.name:
             reason = f"the torque {row.name} has no point of application on the bar"

@@ -14,16 +14,7 @@ from hpcclear.scene.contacts.guide import Guide, PlanarSlide
 from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
 from hpcclear.scene.driving import CrankSpeed, CrankTorque, PlanarDrive, PlanarSpeed, PlanarTorque
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import (
-    Content,
-    Inertia,
-    Length,
-    Mass,
-    NamedPlace,
-    PositiveLength,
-    Table,
-    invalid,
-)
+from hpcclear.scene.fields import Inertia, Length, Mass, NamedPlace, PositiveLength, Table, invalid
 from hpcclear.scene.joints import IdealPinFriction, Material, Materials, PlanarRevolute
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.planar import BarBending, Ground, Planar, PlanarBody, PlanarJoint
@@ -186,13 +177,11 @@ def linkage_of(
     mechanism: SliderCrank, drive: Drive, joints: CrankJoints, effects: EffectTables
 ) -> Planar:
     """The tables of the linkage that a slider-crank is; they are valid since its own are."""
-    bars = [
-        PlanarBody.model_construct(name=name, **_entries(bar, Link))
-        for name, bar in (("crank", mechanism.crank), ("rod", mechanism.rod))
-    ]
+    links = {"crank": mechanism.crank, "rod": mechanism.rod}
+    bars = [PlanarBody.model_construct(name=n, **_entries(link, Link)) for n, link in links.items()]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
     own = mechanism.slider
-    turning: Content = {} if own.inertia is None else {"inertia": own.inertia}
+    turning: dict[str, Any] = {} if own.inertia is None else {"inertia": own.inertia}
     slider = PlanarBody.model_construct(name="slider", mass=own.mass, points=(pin,), **turning)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
@@ -218,17 +207,18 @@ def linkage_of(
     )
 
 
-def _entries(table: Table, of: type[Table]) -> Content:
+def _entries(table: Table, of: type[Table]) -> dict[str, Any]:
     """Entries of a table that it has in common with the linkage's."""
     return {name: getattr(table, name) for name in of.model_fields}
 
 
-def _materials(joint: ClearanceJoint | SliderGuide) -> Content:
+def _materials(joint: ClearanceJoint | SliderGuide) -> dict[str, Any]:
     return {"materials": Materials.model_construct(bearing=joint.bearing, journal=joint.journal)}
 
 
 def _joint(name: str, joint: ClearanceJoint | IdealJoint) -> PlanarJoint:
-    places: Content = dict(zip(("name", "journal", "bearing"), (name, *JOINTS[name]), strict=True))
+    journal, bearing = JOINTS[name]
+    places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
     entries = _entries(joint, PinInBearing) | _materials(joint)

@@ -10,21 +10,13 @@ from pydantic import Field
 
 from hpcclear.base import quantiles
 from hpcclear.plugins import OBJECTIVES
+from hpcclear.scene import stages
 from hpcclear.scene.cases import Case, ObjectiveName
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, check_known, invalid
 from hpcclear.scene.named import Range
 from hpcclear.scene.random_inputs import RandomInput
-from hpcclear.scene.stages import (
-    CertificateOfEffects,
-    MomentAccuracy,
-    Names,
-    Sensitivity,
-    Surrogate,
-    Swarm,
-    Verification,
-)
 from hpcclear.scene.variables import StudyVariable
 
 MOST_EXTREMES = 1024
@@ -65,7 +57,7 @@ class StudyTables(Table):
     """Number of additional points on which each Kriging model is tested."""
     objective: Annotated[str, ObjectiveName(OBJECTIVES)] = "mean-gap"
     """Objective f to minimise: the mean gap (eq. 13), another response, or an objective of your own."""
-    accuracy: MomentAccuracy | None = None
+    accuracy: stages.MomentAccuracy | None = None
     """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: one
     number for both, or a table. Each design is simulated until it meets them. The half-widths include the error of the
     integration tolerance, measured by pairs of samples at a tighter tolerance. Default: `mean = 0.002`, `deviation =
@@ -75,25 +67,25 @@ class StudyTables(Table):
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
     cases: Annotated[tuple[Case, ...], NamedRows()] = ()
-    sensitivity: Sensitivity = Sensitivity()
-    surrogate: Surrogate = Surrogate()
-    swarm: Swarm = Swarm()
-    verification: Verification = Verification()
+    sensitivity: stages.Sensitivity = stages.Sensitivity()
+    surrogate: stages.Surrogate = stages.Surrogate()
+    swarm: stages.Swarm = stages.Swarm()
+    verification: stages.Verification = stages.Verification()
     worst_case: Annotated[bool, Field(strict=True)] = False
     """Whether to search the largest f of the best designs within the bounds of the random inputs (corners and inside).
     Inputs without bounds are taken within three standard deviations."""
-    certificate: CertificateOfEffects | None = None
+    certificate: stages.CertificateOfEffects | None = None
     """Effect screening before the study. Without this table the stage is omitted."""
 
     @property
-    def further(self) -> Names:
+    def further(self) -> stages.Names:
         """Responses besides its objective that objectives and constraints of cases are of."""
         asked = (goal.of for case in self.cases for goal in (*case.goals, *case.kept))
         return tuple(dict.fromkeys(one for one in asked if one not in (None, self.objective)))  # type: ignore[arg-type]
 
     @property
-    def names(self) -> Names:
-        """Names of the study variables, in file order: the columns of its designs."""
+    def names(self) -> stages.Names:
+        """stages.Names of the study variables, in file order: the columns of its designs."""
         return tuple(variable.name for variable in self.variables)
 
     def variable(self, name: str) -> StudyVariable:
@@ -105,9 +97,9 @@ class StudyTables(Table):
         return {row.name: row for row in self.random}[name]
 
     @property
-    def wanted(self) -> MomentAccuracy:
+    def wanted(self) -> stages.MomentAccuracy:
         """Target half-widths of verified designs, or their defaults."""
-        return MomentAccuracy() if self.accuracy is None else self.accuracy
+        return self.accuracy or stages.MomentAccuracy()
 
     @property
     def paired(self) -> bool:
@@ -124,20 +116,20 @@ class StudyTables(Table):
         return tuple(row for row in self.random if row.worn)
 
     @property
-    def groups(self) -> tuple[Names, ...]:
+    def groups(self) -> tuple[stages.Names, ...]:
         """Inputs of the response surfaces, fitted at each level of the sensitivity's parameter."""
         if self.sensitivity.groups is not None:
             return self.sensitivity.groups
         if self.sensitivity.parameter not in self.names:
             return ()
         owner = {row.paths[0]: row.name for row in self.variables if len(row.paths) == 1}
-        pairs = list[Names]()
+        pairs = list[stages.Names]()
         for number in _LINK_NUMBERS:
             own = [owner.get(f"mechanism.{link}.{number}", "") for link in _LINKS]
             pairs += [pair for pair in itertools.pairwise(own) if all(pair)]
         return tuple(pairs) or self._two_by_two()
 
-    def _two_by_two(self) -> tuple[Names, ...]:
+    def _two_by_two(self) -> tuple[stages.Names, ...]:
         """Variables of a linkage's bodies in file order; the last of an odd number goes with the two before it."""
         rows = [row for row in self.variables if row.paths]
         named = [r.name for r in rows if all(p.startswith("mechanism.bodies.") for p in r.paths)]
@@ -147,7 +139,7 @@ class StudyTables(Table):
         return tuple(group for group in (*pairs, tuple(of_bodies[last:])) if group)
 
     @property
-    def models(self) -> tuple[Names, ...]:
+    def models(self) -> tuple[stages.Names, ...]:
         """Inputs of the Kriging models; the last one has those of `optimisation` that f knows."""
         models = self.surrogate.models
         if models is None:
@@ -157,7 +149,7 @@ class StudyTables(Table):
         return (*(model for model in models if model != searched), searched)
 
     @property
-    def optimisation(self) -> Names:
+    def optimisation(self) -> stages.Names:
         """Variables of the optimisation: inputs of the model the swarm searches, and those that only random inputs know."""
         if self.surrogate.optimisation is not None:
             return self.surrogate.optimisation
@@ -168,7 +160,7 @@ class StudyTables(Table):
         """The variable whose values or rows are load cases of every design."""
         return next((one for one in self.variables if one.over is not None), None)
 
-    def design_variables(self, case: str) -> Names:
+    def design_variables(self, case: str) -> stages.Names:
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""
         rows = {row.name: row for row in self.random}
         random = self.case(case).random
@@ -191,7 +183,7 @@ class StudyTables(Table):
         return found
 
     def drivers(self, row: RandomInput) -> tuple[str, ...]:
-        """Names of the variables that drive entries of a random input."""
+        """stages.Names of the variables that drive entries of a random input."""
         return tuple(one.name for one in self._drivers[row.name])
 
     def moves(self, row: RandomInput) -> bool:

@@ -5,15 +5,7 @@ from typing import Annotated, Literal
 from hpcclear.base.written import shown
 from hpcclear.laws import laws
 from hpcclear.laws.declared import FilmLaw
-from hpcclear.scene.fields import (
-    Count,
-    Length,
-    PositiveLength,
-    Quantity,
-    Table,
-    check_one_of,
-    invalid,
-)
+from hpcclear.scene.fields import Count, Length, PositiveLength, Quantity, Table, invalid
 from hpcclear.scene.laws import LawName
 
 
@@ -57,30 +49,28 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
 MOST_WAVES = 8
 """Around a surface."""
 
-Wave = Length
-
 
 class SurfaceWaves(Table):
     """Depth of a surface below the round one, m: a Fourier series in the angle around it. The angle is measured from
     the x axis of the body; in a slider-crank this axis points from the first joint of a link to its second.
     """
 
-    cosine_1: Wave = 0.0
-    sine_1: Wave = 0.0
-    cosine_2: Wave = 0.0
-    sine_2: Wave = 0.0
-    cosine_3: Wave = 0.0
-    sine_3: Wave = 0.0
-    cosine_4: Wave = 0.0
-    sine_4: Wave = 0.0
-    cosine_5: Wave = 0.0
-    sine_5: Wave = 0.0
-    cosine_6: Wave = 0.0
-    sine_6: Wave = 0.0
-    cosine_7: Wave = 0.0
-    sine_7: Wave = 0.0
-    cosine_8: Wave = 0.0
-    sine_8: Wave = 0.0
+    cosine_1: Length = 0.0
+    sine_1: Length = 0.0
+    cosine_2: Length = 0.0
+    sine_2: Length = 0.0
+    cosine_3: Length = 0.0
+    sine_3: Length = 0.0
+    cosine_4: Length = 0.0
+    sine_4: Length = 0.0
+    cosine_5: Length = 0.0
+    sine_5: Length = 0.0
+    cosine_6: Length = 0.0
+    sine_6: Length = 0.0
+    cosine_7: Length = 0.0
+    sine_7: Length = 0.0
+    cosine_8: Length = 0.0
+    sine_8: Length = 0.0
 
     def given(self) -> int:
         """The number of the last wave that is not zero."""
@@ -127,10 +117,8 @@ class WornSurface(Table):
     """Hardness of this surface, Pa."""
 
     def _check(self) -> None:
-        check_one_of(
-            "coefficient", self.coefficient, self.dimensionless,
-            "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
-        )  # fmt: skip
+        remedy = "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness"
+        self.check_one_of(remedy, "coefficient", "dimensionless")
         if (self.dimensionless is None) != (self.hardness is None):
             reason = "a dimensionless coefficient needs a hardness, and one in m2/N must have none"
             raise invalid(reason, "Give both, or neither", "hardness")

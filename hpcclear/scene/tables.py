@@ -83,12 +83,10 @@ class SceneTables(Table):
 
     def objective_named(self, name: str) -> Objective:
         """An objective, of the joints that count here."""
-        chosen, labels = self.numerics.objective_joints, self.joint_labels
-        joints, places = (
-            tuple(map(labels.index, names))
-            for names in (self._contacts_in(chosen), self.contact_labels())
-        )
-        return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
+        chosen = self.numerics.objective_joints
+        joints = tuple(map(self.joint_labels.index, self._contacts_in(chosen)))
+        known = OBJECTIVES.get(name, self.plugin_texts)
+        return bound(known, name, self.open_places, joints, chosen)
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: requested, or required by the study."""
@@ -132,11 +130,8 @@ class SceneTables(Table):
 
     def bending(self) -> dict[str, BarBending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
-        return {
-            self.path_in_scene(f"mechanism.bodies.{body.name}"): body.bending
-            for body in self.linkage.bodies
-            if body.bending is not None
-        }
+        own = {one.name: one.bending for one in self.linkage.bodies if one.bending is not None}
+        return {self.path_in_scene(f"mechanism.bodies.{n}"): table for n, table in own.items()}
 
     @property
     def modes(self) -> int:
@@ -146,11 +141,8 @@ class SceneTables(Table):
     @property
     def mode_labels(self) -> tuple[str, ...]:
         """Labels along the dimension ``mode``: "rod.1" and so on, in the order of the coordinates."""
-        return tuple(
-            f"{key.rpartition('.')[2]}.{mode}"
-            for key, table in self.bending().items()
-            for mode in range(1, table.modes + 1)
-        )
+        bars = {key.rpartition(".")[2]: table.modes for key, table in self.bending().items()}
+        return tuple(f"{bar}.{k}" for bar, modes in bars.items() for k in range(1, modes + 1))
 
     @property
     def has_thresholds(self) -> bool:
@@ -247,10 +239,11 @@ class SceneTables(Table):
 
     def joint_effects(self) -> dict[str, str]:
         """Words of effects that joints have as tables of their own, by the dotted paths of these."""
-        return {
-            f"{self.joint_key(one.joint.name)}.{one.entry}": f"{one.effect.words} in {one.joint.name}"
-            for one in loads_of(self.linkage.joints)
-        }
+        found = {}
+        for one in loads_of(self.linkage.joints):
+            name, words = one.joint.name, one.effect.words
+            found[f"{self.joint_key(name)}.{one.entry}"] = f"{words} in {name}"
+        return found
 
     def pin(self, name: str) -> PlanarClearance:
         """The table of a pin in a bearing."""

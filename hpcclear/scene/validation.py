@@ -82,11 +82,10 @@ def scene_of(kind: type[Whole], content: Content, before: SceneTables | None = N
         if rows != content.get("plugins", {}).get("packages", {}):
             scene = validated(kind, replace(content, "plugins.packages", rows))
         own = set[object](before.written) if before else set(_numbers_in(content))
-        scene._texts = {
-            key: text
-            for key, text in texts.items()
-            if is_written_in(text) or (key if before else key[0]) in own
-        }
+        kept = [
+            k for k, text in texts.items() if is_written_in(text) or (k if before else k[0]) in own
+        ]
+        scene._texts = {key: texts[key] for key in kept}
         if scene.study is not None:
             try:
                 with reading(dict(scene.written)):
@@ -161,11 +160,8 @@ def _check_corners(scene: SceneTables, study: Study) -> None:
     names = (*PHYSICAL, "numerics", "plugins")
     content = {name: plain(table) for name in names if (table := getattr(scene, name))}
     reach = {row.name: study.reach(row) for row in study.random if not row.absolute}
-    spans = {
-        variable.name: ("variables", variable.paths, variable.bounds)
-        for variable in study.variables
-        if variable.paths and variable.ratio is None
-    }
+    moved = [one for one in study.variables if one.paths and one.ratio is None]
+    spans = {one.name: ("variables", one.paths, one.bounds) for one in moved}
     for row in study.random:
         if row.name not in study.names:
             centre = 0.0 if row.absolute else scene.number(row.paths[0])
@@ -178,27 +174,22 @@ def _check_corners(scene: SceneTables, study: Study) -> None:
             corners += [("random", lower + low), ("random", upper + high)]
         for key, value in corners:
             entries, words = dict.fromkeys(paths, value), scene.shown(paths[0], value)
-            _check_corner(type(scene), content, entries, f"study.{key}.{name}", f"{name} = {words}")
+            _check_corner(scene, content, entries, f"study.{key}.{name}", f"{name} = {words}")
     for variable in study.variables:
         for option in variable.rows:
             entries = {path: float(option.entries[path]) for path in variable.entry_paths}
             key = f"study.variables.{variable.name}"
-            _check_corner(type(scene), content, entries, key, f"{variable.name} = {option.name!r}")
+            _check_corner(scene, content, entries, key, f"{variable.name} = {option.name!r}")
 
 
 def _check_corner(
-    kind: type[SceneTables],
-    content: Tables,
-    entries: Mapping[str, float],
-    key: str,
-    words: str,
+    scene: SceneTables, content: Tables, entries: Mapping[str, float], key: str, words: str
 ) -> None:
     """An error for validators unless the scene is one with other entries."""
-    corner = content
     for path, value in entries.items():
-        corner = replace(corner, path, value)
+        content = replace(content, path, value)
     try:
-        kind.model_validate(corner)
+        type(scene).model_validate(content)
     except ValidationError as error:
         said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
         reason = getattr(said, "reason", "it is not valid")
@@ -207,14 +198,10 @@ def _check_corner(
 
 
 def _check_depth(content: Tables) -> None:
-    level: list[object] = [content]
+    level: list[Any] = [content]
     for _ in range(DEEPEST):
-        level = [
-            inner
-            for outer in level
-            for inner in (outer.values() if isinstance(outer, Mapping) else outer)  # type: ignore[attr-defined]
-            if isinstance(inner, (Mapping, list, tuple))
-        ]
+        below = (list(one.values()) if isinstance(one, Mapping) else one for one in level)
+        level = [one for row in below for one in row if isinstance(one, (Mapping, list, tuple))]
         if not level:
             return
     remedy = f"Nest at most {DEEPEST} levels of tables and arrays"

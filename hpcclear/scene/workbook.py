@@ -375,15 +375,13 @@ class _Page:
     def hidden(self) -> str:
         """Rows and columns with cells that are not shown, in words; "" for none."""
         width = max(map(len, self.rows.values()), default=0)
-        own = {
-            "rows": [str(row) for row in self._hidden_rows if row in self.rows],
-            "columns": [letters(one) for one in self._hidden_columns if one <= width],
-        }
-        return " and ".join(
-            f"{kind} {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}"
-            for kind, names in own.items()
-            if names
-        )
+        rows = [str(row) for row in self._hidden_rows if row in self.rows]
+        columns = [letters(one) for one in self._hidden_columns if one <= width]
+        found = []
+        for kind, names in (("rows", rows), ("columns", columns)):
+            more = ", ..." if len(names) > 8 else ""
+            found += [f"{kind} {', '.join(names[:8])}{more}"] if names else []
+        return " and ".join(found)
 
     def refuse_merged(self) -> None:
         """InputError where a row with several filled cells has merged ones; a title may be merged."""

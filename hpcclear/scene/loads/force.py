@@ -9,7 +9,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, by_angle, by_time
-from hpcclear.scene.fields import Angle, PairTable, Quantity, check_one_of
+from hpcclear.scene.fields import Angle, PairTable, Quantity
 from hpcclear.scene.loads.declared import SizedLoad
 
 
@@ -43,20 +43,16 @@ class ForceLoad(SizedLoad):
     unit: ClassVar[str] = "N"
 
     def _check(self) -> None:
-        force = None if self.force is None else [self.force.x, self.force.y]
-        size = self.size if self.size is not None else self.size_by_time
-        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
+        remedy = "Write force = [x, y], or size and direction"
+        self.check_one_of(remedy, "force", "size", "size_by_time")
 
     def components(self) -> tuple[Array | float, Array | float]:
         """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""
         if self.force is not None:
             return self.force.x, self.force.y
-        # a quarter turn is one, to the last bit
-        cosine, sine = (
-            np.where(np.abs(part) < 1e-15, 0.0, part)[()]
-            for part in (np.cos(self.direction), np.sin(self.direction))
-        )
-        return self.constant * cosine, self.constant * sine
+        parts = np.array([np.cos(self.direction), np.sin(self.direction)])
+        parts[np.abs(parts) < 1e-15] = 0.0  # a quarter turn is one, to the last bit
+        return self.constant * parts[0], self.constant * parts[1]
 
     def numbers(self) -> dict[str, Array | float]:
         """Its components."""

@@ -6,7 +6,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, by_angle, by_time
-from hpcclear.scene.fields import check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
 
 
@@ -27,7 +26,7 @@ class TorqueLoad(SizedLoad):
 
     def _check(self) -> None:
         remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
-        check_one_of("torque", self.torque, self.torque_by_time, remedy)
+        self.check_one_of(remedy, "torque", "torque_by_time")
 
     def numbers(self) -> dict[str, Array | float]:
         """Its size."""
