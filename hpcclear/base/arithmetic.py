@@ -25,12 +25,8 @@ LONGEST_SHOWN = 60
 """Characters of a part of a formula in a message."""
 
 _SIGNS: dict[type[ast.AST], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: math.pow,
-}
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: math.pow,
+}  # fmt: skip
 _FUNCTIONS: dict[str, Callable[..., float]] = {
     "sqrt": math.sqrt, "exp": math.exp, "log": math.log, "tanh": math.tanh, "atan": math.atan, "abs": abs,
     "copysign": math.copysign, "min": min, "max": max, "pow": math.pow,

@@ -10,12 +10,12 @@ Kind = TypeVar("Kind")
 
 def kinds_in(package: str, path: Iterable[str], base: type[Kind]) -> dict[str, type[Kind]]:
     """Subclasses of a class that modules of a package define and that have a `kind` and a `name`, by their kinds."""
-    modules = [import_module(f"{package}.{one.name}") for one in pkgutil.iter_modules(path)]
-    found: list[Any] = [
-        one
-        for module in modules
-        for one in vars(module).values()
-        if isinstance(one, type) and issubclass(one, base) and one.__module__ == module.__name__
-    ]
-    named = (one for one in found if {"kind", "name"} <= one.model_fields.keys())
-    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in named}
+    found: dict[str, Any] = {}
+    for module in pkgutil.iter_modules(path):
+        name = f"{package}.{module.name}"
+        for one in vars(import_module(name)).values():
+            if isinstance(one, type) and issubclass(one, base) and one.__module__ == name:
+                fields = one.model_fields  # type: ignore[attr-defined]
+                if {"kind", "name"} <= fields.keys():
+                    found[get_args(fields["kind"].annotation)[0]] = one
+    return found

@@ -14,19 +14,18 @@ import json
 import os
 import secrets
 import socket
-from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 from hpcclear.base import host
 from hpcclear.base.errors import InputError, refused
 
 _NO_FLOCK = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
+_SLURM = ("SLURM_JOB_ID", "SLURM_RESTART_COUNT")
 _ATTEMPTS = 100  # of taking a lock that others keep releasing in between
 
 
-@dataclass(frozen=True)
-class Holder:
+class Holder(NamedTuple):
     """Who holds a lock; empty text where something is not known."""
 
     host: str
@@ -39,28 +38,20 @@ class Holder:
     @classmethod
     def this_process(cls) -> "Holder":
         """The running process."""
-        pid = os.getpid()
-        return cls(
-            host=socket.gethostname(),
-            boot=_boot(),
-            pid=pid,
-            started=_started(pid),
-            job=os.environ.get("SLURM_JOB_ID", ""),
-            restart=os.environ.get("SLURM_RESTART_COUNT", ""),
-        )
+        pid, (job, restart) = os.getpid(), (os.environ.get(name, "") for name in _SLURM)
+        return cls(socket.gethostname(), _boot(), pid, _started(pid), job, restart)
 
     @classmethod
     def parse(cls, text: bytes) -> "Holder | None":
         """The holder a lock file names; None when its writer was killed while writing."""
         try:
             found = json.loads(text)
-            holder = cls(**{field.name: found[field.name] for field in fields(cls)})
+            holder = cls(*(found[name] for name in cls._fields))
         except (ValueError, KeyError, TypeError, RecursionError):
             return None
-        texts = (holder.host, holder.boot, holder.started, holder.job, holder.restart)
-        if not all(isinstance(entry, str) for entry in texts):
-            return None
-        return holder if isinstance(holder.pid, int) and holder.pid > 0 else None
+        kinds = [int if name == "pid" else str for name in cls._fields]
+        fine = all(map(isinstance, holder, kinds)) and holder.pid > 0
+        return holder if fine else None
 
     def is_over(self) -> bool:
         """Whether the holder is known to be gone; False when that is not known."""
@@ -100,10 +91,8 @@ def _alive(pid: int, started: str) -> bool:
 def _is_flocked(descriptor: int) -> bool:
     try:
         host.lock_file(descriptor, shared=True)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
+    except OSError as error:
+        return isinstance(error, BlockingIOError)
     return False
 
 
@@ -246,7 +235,7 @@ class Lock:
             return False
         os.ftruncate(descriptor, 0)
         os.lseek(descriptor, 0, os.SEEK_SET)
-        os.write(descriptor, json.dumps(asdict(Holder.this_process())).encode())
+        os.write(descriptor, json.dumps(Holder.this_process()._asdict()).encode())
         os.fsync(descriptor)
         return True
 
@@ -271,8 +260,6 @@ class Lock:
 
     def _refusal(self, holder: Holder | None) -> InputError:
         who = f"{holder} holds it" if holder is not None else "another run is taking it"
-        remedy = (
-            f"Wait for that run or stop it. If no run is active any more, remove {self.path} "
-            "and run the command again"
-        )
-        return InputError("output", str(self.path.parent), f"{who}", remedy)
+        else_ = f"If no run is active any more, remove {self.path} and run the command again"
+        remedy = f"Wait for that run or stop it. {else_}"
+        return InputError("output", str(self.path.parent), who, remedy)

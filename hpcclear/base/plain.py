@@ -11,9 +11,5 @@ def plain(text: str) -> str:
     r"""Return a text with its control characters written out, as in ``\x1b``; line feeds and tabs stay."""
     if text.isascii() and text.isprintable():
         return text
-    return "".join(
-        character.encode("unicode_escape").decode()
-        if character not in _KEPT and unicodedata.category(character) in _CATEGORIES
-        else character
-        for character in text
-    )
+    commands = {one for one in set(text) - {*_KEPT} if unicodedata.category(one) in _CATEGORIES}
+    return text.translate({ord(o): o.encode("unicode_escape").decode() for o in commands})

@@ -50,12 +50,18 @@ _SINGLE: dict[str, Unit] = {
     "%": _unit(Fraction(1, 100)), "‰": _unit(Fraction(1, 1000)),
 }  # fmt: skip
 
-UNITS: dict[str, Unit] = _SINGLE | {
-    prefix + symbol: (size * Fraction(10) ** exponent, powers)
-    for symbol, (size, powers) in _BASES.items()
-    for prefix, exponent in _PREFIXES.items()
-    if prefix + symbol not in ("Mm", "Gg", "Grad", "hbar")  # nobody means them
-}
+
+def _prefixed(prefixes: dict[str, int], unmeant: tuple[str, ...]) -> dict[str, Unit]:
+    """Units with prefixes, but for those that nobody means."""
+    return {
+        prefix + symbol: (size * Fraction(10) ** exponent, powers)
+        for symbol, (size, powers) in _BASES.items()
+        for prefix, exponent in prefixes.items()
+        if prefix + symbol not in unmeant
+    }
+
+
+UNITS: dict[str, Unit] = _SINGLE | _prefixed(_PREFIXES, ("Mm", "Gg", "Grad", "hbar"))
 """Units by symbol, which remedies propose."""
 
 _LONG = {
@@ -93,18 +99,12 @@ _FURTHER: dict[str, Unit] = {
     "l L liter litre": _unit(Fraction(1, 1000), 3), "dimensionless": _unit(1),
 }  # fmt: skip
 OTHERS: dict[str, Unit] = {name: unit for names, unit in _FURTHER.items() for name in names.split()}
-OTHERS |= {
-    prefix + symbol: (size * Fraction(10) ** exponent, powers)
-    for symbol, (size, powers) in _BASES.items()
-    for prefix, exponent in (("p", -12), ("T", 12))
-    if prefix + symbol not in ("pbar", "Tm", "Tg")
-}
-OTHERS |= {
-    prefix + word: (UNITS | OTHERS)[short + symbol]
-    for prefix, short in _LONG.items()
-    for word, symbol in _WORDS.items()
-    if short + symbol in UNITS | OTHERS
-}
+OTHERS |= _prefixed({"p": -12, "T": 12}, ("pbar", "Tm", "Tg"))
+_KNOWN = UNITS | OTHERS
+for _prefix, _short in _LONG.items():
+    OTHERS |= {
+        _prefix + one: _KNOWN[_short + of] for one, of in _WORDS.items() if _short + of in _KNOWN
+    }
 _PLURAL = [name for name in OTHERS if len(name) > 3 and name[-1] not in "szH"]
 OTHERS |= {f"{name}s": OTHERS[name] for name in _PLURAL}
 """Units that are read besides: the SI's in full words, and those of other systems."""

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -130,24 +131,15 @@ def identified(
     inputs = ensemble.inputs
     units = [one.unit for one in inputs.unknowns]
     limit = settings.limit_in(units[0])
-    coords: dict[str, np.ndarray] = {
-        "unknown": np.array([one.name for one in inputs.unknowns], str),
-        "input": np.array(inputs.names, str),
-        "end": np.array(["lower", "median", "upper"], str),
-    }
-    data: dict[str, np.ndarray] = {
-        "unit": np.array(units, str),
-        "prior_lower": np.array([one.lower for one in inputs.unknowns]),
-        "prior_upper": np.array([one.upper for one in inputs.unknowns]),
-    }
+    names, lower, upper = zip(*((o.name, o.lower, o.upper) for o in inputs.unknowns), strict=True)
+    ends = ("lower", "median", "upper")
+    coords: dict[str, Any] = {"unknown": names, "input": inputs.names, "end": ends}
+    data: dict[str, Any] = {"unit": units, "prior_lower": lower, "prior_upper": upper}
     if found:
         particles = np.stack([verdict.particles for _, verdict in found])
         features = list(dict.fromkeys(label for made, _ in found for label in made.labels))
-        coords |= {
-            "record": np.array([str(path) for path in settings.signals], str),
-            "particle": np.arange(particles.shape[1]),
-            "feature": np.array(features, str),
-        }
+        coords |= {"record": [str(path) for path in settings.signals], "feature": features}
+        coords["particle"] = np.arange(particles.shape[1])
         data |= _of_records(found, particles, features, len(units)) | {"elapsed": times}
         explained = np.array([verdict.explained for _, verdict in found])
         rng = np.random.default_rng([seed, 0x6869])
@@ -155,10 +147,7 @@ def identified(
         if grown is not None:
             data |= {"rate": grown.rate, "time_to_limit": grown.time}
     if gains is not None:
-        coords |= {
-            "candidate": np.array(gains.names),
-            "revolutions": np.array(advising.REVOLUTIONS),
-        }
+        coords |= {"candidate": gains.names, "revolutions": advising.REVOLUTIONS}
         data |= {"expected_half_width": gains.half_width, "expected_correlation": gains.correlation}
     further = {
         **attributes, "members": len(ensemble.places), "failed_members": ensemble.failed,

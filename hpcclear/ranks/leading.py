@@ -20,16 +20,10 @@ _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
 
 
 def run_points(
-    ranks: Ranks,
-    task: Task,
-    points: PointSource,
-    *,
-    completed: np.ndarray | None = None,
-    on_records: Callable[[np.ndarray], object] | None = None,
-    save: Callable[[], object] | None = None,
-    progress: Progress | None = None,
-    keep: bool = True,
-) -> np.ndarray:
+    ranks: Ranks, task: Task, points: PointSource, *, completed: np.ndarray | None = None,
+    on_records: Callable[[np.ndarray], object] | None = None, save: Callable[[], object] | None = None,
+    progress: Progress | None = None, keep: bool = True,
+) -> np.ndarray:  # fmt: skip
     """Simulate a design on all ranks; call it on root, as often as needed. Returns a record a sample in ascending order if
     `keep`.
 

@@ -88,17 +88,10 @@ class Checkpoint:
     """
 
     def __init__(
-        self,
-        directory: Path,
-        key: Mapping[str, str],
-        *,
-        interval: float = INTERVAL,
-        units: Mapping[str, str] | None = None,
-        attributes: Mapping[str, object] | None = None,
-        joints: Sequence[str] = JOINTS,
-        record: np.dtype = OUTCOME,
+        self, directory: Path, key: Mapping[str, str], *, interval: float = INTERVAL, units: Mapping[str, str] | None = None,
+        attributes: Mapping[str, object] | None = None, joints: Sequence[str] = JOINTS, record: np.dtype = OUTCOME,
         clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.directory = directory
         self.key = dict(key)
         self.interval = interval

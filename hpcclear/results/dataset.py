@@ -34,16 +34,10 @@ NOT_CHECKED = "not checked: no replicas were simulated"
 
 
 def dataset(
-    kind: str,
-    coords: Mapping[str, ArrayLike],
-    data: Mapping[str, ArrayLike],
-    attributes: Mapping[str, object] | None = None,
-    units: Mapping[str, str] | None = None,
-    objective: Objective = MEAN_GAP,
-    words: Mapping[str, str] | None = None,
-    *,
+    kind: str, coords: Mapping[str, ArrayLike], data: Mapping[str, ArrayLike], attributes: Mapping[str, object] | None = None,
+    units: Mapping[str, str] | None = None, objective: Objective = MEAN_GAP, words: Mapping[str, str] | None = None, *,
     whole: bool = True,
-) -> Results:
+) -> Results:  # fmt: skip
     """The content of one kind of result file (a key of `KINDS`), with every attribute the table knows.
 
     `coords`: all coordinates of the kind; `data`: its variables, and design variables under their names or scene paths, for
@@ -139,16 +133,10 @@ def variable_name(name: str, kind: str = "samples") -> str:
 
 
 def samples_dataset(
-    names: Sequence[str],
-    values: ArrayLike,
-    units: Mapping[str, str],
-    records: np.ndarray,
-    attributes: Mapping[str, object] | None = None,
-    objective: Objective = MEAN_GAP,
-    words: Mapping[str, str] | None = None,
-    joints: Sequence[str] = outcome.JOINTS,
-    labels: Sequence[str] = (),
-) -> Results:
+    names: Sequence[str], values: ArrayLike, units: Mapping[str, str], records: np.ndarray,
+    attributes: Mapping[str, object] | None = None, objective: Objective = MEAN_GAP, words: Mapping[str, str] | None = None,
+    joints: Sequence[str] = outcome.JOINTS, labels: Sequence[str] = (),
+) -> Results:  # fmt: skip
     """Outcome records (n,), in any order, and the designs they belong to (n, k), SI, as results of kind ``samples``, by
     growing sample number.
 

@@ -45,13 +45,10 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     if stat.S_ISDIR(about.st_mode):
         raise refused(path, OSError(errno.EISDIR, ""))
     if not ours:
-        regular = stat.S_ISREG(about.st_mode)
-        reason = (
-            "the existing file was not written by hpcclear, or it was cut off"
-            if regular
-            else "it is not a regular file"
-        )
-        remedy = "Choose another name" + (", or move that file away" if regular else "")
+        reason, remedy = "it is not a regular file", "Choose another name"
+        if stat.S_ISREG(about.st_mode):
+            reason = "the existing file was not written by hpcclear, or it was cut off"
+            remedy += ", or move that file away"
         raise InputError("output", str(path), reason, remedy)
 
 
@@ -115,7 +112,8 @@ def _replaced(name: str, content: Buffer, directory: int | None) -> bool:
         except FileNotFoundError:
             return False
     except BaseException:
-        _unlink(temporary, directory)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary, dir_fd=directory)
         raise
     return True
 
@@ -138,13 +136,6 @@ def _write_whole(name: str, content: Buffer, directory: int | None) -> None:
         os.fsync(file)
     finally:
         os.close(file)  # may raise as well: NFS reports a full disk here
-
-
-def _unlink(name: str, directory: int | None) -> None:
-    try:
-        os.unlink(name, dir_fd=directory)
-    except FileNotFoundError:
-        return
 
 
 def fsync_directory(descriptor: int) -> None:

@@ -66,8 +66,5 @@ LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 def designs_in(samples: Results) -> dict[str, np.ndarray]:
     """The design variables in results, each of the shape of its dimensions, by their names or scene paths."""
-    return {
-        str(variable.attrs["scene_path"]): variable.to_numpy()
-        for variable in samples.variables.values()
-        if variable.attrs.get("role") == ROLE
-    }
+    designs = [one for one in samples.variables.values() if one.attrs.get("role") == ROLE]
+    return {str(one.attrs["scene_path"]): one.values for one in designs}

@@ -137,12 +137,8 @@ def text(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
     return FileVariable(dims, "", long_name, "text", required)
 
 
-_CODES = {
-    "latched": FlagCodes((0, 1), ("free", "latched")),
-    "regime": FlagCodes.of(Regime),
-    "status": FlagCodes.of(Status),
-    "flags": FlagCodes.of(Flag),
-}
+_CODES = {one.__name__.lower(): FlagCodes.of(one) for one in (Regime, Status)}
+_CODES |= {"flags": FlagCodes.of(Flag), "latched": FlagCodes.of("free latched")}
 """Of the codes in a record."""
 
 

@@ -58,33 +58,36 @@ Lines = list[tuple[int, str]]
 """Numbers, from 1 on, and texts of lines."""
 
 
+_MARKS = {
+    codecs.BOM_UTF8: "UTF-8", codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32", codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}  # fmt: skip
+"""How texts begin whose first bytes state their encoding."""
+
+
 def bytes_of(path: Path, what: str) -> bytes:
     """Bytes of a file that may be a table; raises InputError where it is too large, or of another kind."""
     data = content_of(path, what, LARGEST_FILE, "Give a CSV or .xlsx file", "Split it")
-    for begin, kind in _FOREIGN.items():
-        if data.startswith(begin):
-            raise InputError(what, str(path), f"is {kind}", _SAVE)
+    kind = next((kind for begin, kind in _FOREIGN.items() if data.startswith(begin)), "")
     if data.startswith(PACKED) and b"vnd.oasis.opendocument" in data[:200]:
-        raise InputError(what, str(path), "is an OpenDocument file (.ods)", _SAVE)
+        kind = "an OpenDocument file (.ods)"
     if re.match(rb"\s*<(!doctype|html|\?xml|table)", data[:200], re.IGNORECASE):
-        raise InputError(what, str(path), "is a page of markup (HTML or XML)", _SAVE)
+        kind = "a page of markup (HTML or XML)"
+    if kind:
+        raise InputError(what, str(path), f"is {kind}", _SAVE)
     return data
 
 
 def _decoded(path: Path, what: str, data: bytes) -> tuple[str, str]:
     """Text of a file, and its encoding in words."""
-    for mark, encoding in (
-        (codecs.BOM_UTF8, "UTF-8"), (codecs.BOM_UTF32_LE, "UTF-32"), (codecs.BOM_UTF32_BE, "UTF-32"),
-        (codecs.BOM_UTF16_LE, "UTF-16"), (codecs.BOM_UTF16_BE, "UTF-16"),
-    ):  # fmt: skip
-        if data.startswith(mark):
-            codec = "utf-8-sig" if encoding == "UTF-8" else encoding
-            break
-    else:
-        nulls = data[:2000].count(0)
-        codec = encoding = "UTF-8"
-        if nulls and nulls * 4 >= min(len(data), 2000):  # every other byte of Latin letters
-            codec, encoding = ("UTF-16-LE" if data[1:2] == b"\0" else "UTF-16-BE"), "UTF-16"
+    nulls = data[:2000].count(0)
+    codec = encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
+    if (
+        not encoding and nulls and nulls * 4 >= min(len(data), 2000)
+    ):  # every other byte of Latin letters
+        codec, encoding = ("UTF-16-LE" if data[1:2] == b"\0" else "UTF-16-BE"), "UTF-16"
+    encoding = encoding or "UTF-8"
+    codec = "utf-8-sig" if encoding == "UTF-8" else codec
     try:
         text = data.decode(codec)
     except UnicodeDecodeError as error:
@@ -260,12 +263,7 @@ def columns_of(
     if body and _are_units(body[0][1]):
         units = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]]
         body = body[1:]
-    cells = [
-        one
-        if len(one) == len(header)
-        else _row(path, number, header, one[:width], one[width:], separator)
-        for number, one in body
-    ]
+    cells = [_row(path, number, header, one, width, separator) for number, one in body]
     if not cells:
         reason = f"contains no points ({found})"
         raise InputError(what, str(path), reason, "Write a row for each point or value")
@@ -291,21 +289,21 @@ def _header(rows: Rows) -> int:
 
 
 def _row(
-    path: Path, line: int, header: list[str], cells: list[str], more: list[str], separator: str
+    path: Path, line: int, header: list[str], found: list[str], width: int, separator: str
 ) -> list[str]:
-    """Cells of a row, as many as headings."""
-    count = len(cells) + len(more)
-    if len(cells) < len(header) and len(header) > 1 and separator in (",", ""):
-        reason = f"has {count} cells instead of {len(header)}"
-        remedy = "Give each column a value"
-        raise InputError(f"{path}, line {line}", ",".join(cells)[:200], reason, remedy)
-    if any(more) or len(cells) > len(header):
-        reason, remedy = f"has {count} cells instead of {len(header)}", "Give each column a value"
-        if separator == "," and count == 2 * len(header):
+    """Cells of a row, as many as headings; the columns of a table are as many as `width`."""
+    if len(found) == len(header):
+        return found
+    count, cells = len(found), found[:width]
+    reason, remedy = f"has {count} cells instead of {len(header)}", "Give each column a value"
+    few = len(cells) < len(header) and len(header) > 1 and separator in (",", "")
+    many = any(found[width:]) or len(cells) > len(header)
+    if many and not few and separator == ",":
+        if count == 2 * len(header):
             reason += ": commas seem to stand between cells and in decimals"
-        if separator == ",":
-            remedy = "Where decimals have commas, save it with semicolons between cells"
-        raise InputError(f"{path}, line {line}", ",".join([*cells, *more])[:200], reason, remedy)
+        remedy = "Where decimals have commas, save it with semicolons between cells"
+    if few or many:
+        raise InputError(f"{path}, line {line}", ",".join(found)[:200], reason, remedy)
     return cells + [""] * (len(header) - len(cells))
 
 

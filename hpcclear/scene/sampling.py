@@ -13,7 +13,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
-from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.random_inputs import RandomInput
@@ -66,13 +65,8 @@ def points_at(scene: Scene, names: tuple[str, ...], coordinates: Array) -> Point
 
 
 def _chances(
-    seed: int,
-    purpose: str,
-    names: Sequence[str],
-    span: tuple[int, int],
-    replicates: Sequence[int] | None,
-    stratified: bool,
-) -> list[Array]:
+    seed: int, purpose: str, names: Sequence[str], span: tuple[int, int], replicates: Sequence[int] | None, stratified: bool
+) -> list[Array]:  # fmt: skip
     """Independent probabilities of each name, `span`: from which index on and how many; as `monte_carlo` has them."""
     first, count = span
     if stratified:
@@ -133,8 +127,11 @@ def monte_carlo(
     replicates = [replicate] if isinstance(replicate, int) else replicate
     uniform = _chances(study.seed, purpose, moving, (first, count), replicates, stratified)
     each, count = count, count * len(replicates or [0])
-    if study.correlation is not None:
-        uniform = _together(study.correlation, moving, chosen, uniform)
+    if study.correlation is not None:  # of the random inputs
+        rows = [k for k, name in enumerate(moving) if name in chosen]
+        own = [moving[k] for k in rows], [uniform[k] for k in rows]
+        for k, one in zip(rows, study.correlation.together(*own), strict=True):
+            uniform[k] = one
     places = dict(zip(moving, uniform, strict=True))
     values = np.empty((count, len(names)))
     for column, name in enumerate(names):
@@ -196,11 +193,8 @@ def _by_designs(
 
 
 def offsets(
-    scene: Scene,
-    random: Sequence[str],
-    chances: Sequence[Array],
-    design: Mapping[str, float] | None = None,
-) -> dict[str, Array]:
+    scene: Scene, random: Sequence[str], chances: Sequence[Array], design: Mapping[str, float] | None = None
+) -> dict[str, Array]:  # fmt: skip
     """Random inputs at independent probabilities, (n,) each, which are made to vary together as the study says: values of
     those that are absolute, else differences from the design (SI, by name), which counts where distributions depend on it."""
     study = scene.required_study
@@ -208,17 +202,6 @@ def offsets(
         chances = study.correlation.together(random, chances)
     laws = (study.law(study.random_input(name), design or {}) for name in random)
     return {name: law(one) for name, law, one in zip(random, laws, chances, strict=True)}
-
-
-def _together(
-    correlation: Correlation, moving: Sequence[str], chosen: Collection[str], uniform: list[Array]
-) -> list[Array]:
-    """Probabilities of what moves, those of random inputs that vary together made so."""
-    rows = [k for k, name in enumerate(moving) if name in chosen]
-    made = correlation.together([moving[k] for k in rows], [uniform[k] for k in rows])
-    for k, one in zip(rows, made, strict=True):
-        uniform[k] = one
-    return uniform
 
 
 def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str, ...]:

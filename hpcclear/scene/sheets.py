@@ -14,20 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcclear.base import units
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at, nearest
-from hpcclear.base.units import (
-    UnitError,
-    check_thousands,
-    factor,
-    fits,
-    mended,
-    note_turns,
-    quantity,
-    scaled,
-    to_si,
-    written,
-)
 from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import NOTHING, SheetColumn, Stored, columns_of, decimal_of
 from hpcclear.scene.workbook import cells_of
@@ -39,16 +28,10 @@ AXES = {"time": "s", "angle": "rad"}
 _NAMES = {"time": ("time", "t"), "angle": ("angle", "crank angle", "crankangle", "phi")}
 """Headings of these, in small letters and without signs."""
 _BEGIN = {
-    kind: tuple(words.split())
-    for kind, words in {
-        "angle": "angle deg phi φ crank winkel kw ca theta θ kurbelwinkel",
-        "speed": "speed drehzahl omega n",
-        "time": "time zeit t",
-        "pressure": "pressure druck p_ p",
-        "force": "force kraft f",
-        "torque": "torque moment drehmoment m",
-    }.items()
-}
+    "angle": ("angle", "deg", "phi", "φ", "crank", "winkel", "kw", "ca", "theta", "θ", "kurbelwinkel"),
+    "speed": ("speed", "drehzahl", "omega", "n"), "time": ("time", "zeit", "t"), "pressure": ("pressure", "druck", "p_", "p"),
+    "force": ("force", "kraft", "f"), "torque": ("torque", "moment", "drehmoment", "m"),
+}  # fmt: skip
 """How headings begin, in small letters, of columns whose unit says nothing."""
 _BEGINS = re.compile(r"\s*[-+.,0-9\u2212]")
 """How a number begins."""
@@ -87,9 +70,10 @@ class Sheet:
         reason, remedy = "is not a finite decimal number", "Write a number such as 0.21"
         try:
             if number is not None:
-                return scaled(number, size)
+                return units.scaled(number, size)
             if not column.unit and self._has_unit(text):
-                return to_si(text.replace(",", ".") if comma else text, unit, comma or stored)
+                pointed = text.replace(",", ".") if comma else text
+                return units.to_si(pointed, unit, comma or stored)
             if text.lower() in NOTHING:
                 reason, remedy = f"the cell is empty: it {reason}", "Give each column a value"
             elif text.startswith("#"):
@@ -98,9 +82,9 @@ class Sheet:
                 reason = "is a date or time: spreadsheet programs make dates of numbers such as 1.3"
                 remedy = "Format the cell as a number and write it again"
             else:
-                remedy = mended(text) or remedy
-                check_thousands(text)
-        except UnitError as error:
+                remedy = units.mended(text) or remedy
+                units.check_thousands(text)
+        except units.UnitError as error:
             reason, remedy = error.reason, error.remedy
         raise InputError(self.place(column, row), cell, reason, remedy)
 
@@ -130,14 +114,14 @@ class Sheet:
         own, size = plain_unit(column.unit or default, unit), _ONE
         if own not in ("", unit):
             with at(key, column.heading):
-                size = factor(own, unit)
-            note_turns(f"1 {own} in {column.heading}", "1", own, unit)
+                size = units.factor(own, unit)
+            units.note_turns(f"1 {own} in {column.heading}", "1", own, unit)
         if not self.comma and all(map(_PLAIN.issuperset, column.cells)):
             try:
                 values = np.array(column.cells, dtype=float)
                 if np.isfinite(values).all():
-                    exact = values if size == 1 else [scaled(one, size) for one in values.tolist()]
-                    return np.asarray(exact)
+                    exact = (units.scaled(one, size) for one in values.tolist())
+                    return values if size == 1 else np.array(list(exact))
             except ValueError:  # said below, with its place
                 pass
         return np.array([self.number(column, row, unit, size) for row in range(len(self.lines))])
@@ -149,14 +133,14 @@ class Sheet:
         """
         if column.unit or not all(map(self._has_unit, column.cells)):
             values = self.si(column, column.unit, "").tolist()
-            return [written(value, column.unit) for value in values]
+            return [units.written(value, column.unit) for value in values]
         made = list[float | str]()
         for row, cell in enumerate(column.cells):
             comma, stored = self._signs(cell)
             pointed = cell.replace(",", ".") if comma else cell
             with at(self.place(column, row), cell):
-                number, unit = quantity(pointed, "", decided=comma or stored)
-            made.append(written(float(number), unit))
+                number, unit = units.quantity(pointed, "", decided=comma or stored)
+            made.append(units.written(float(number), unit))
         return made
 
     def place(self, column: SheetColumn, row: int) -> str:
@@ -189,7 +173,7 @@ class Sheet:
         first = self.columns[0]
         for kind, unit in AXES.items() if not found else ():
             begins = not first.unit and plain_name(first.name).startswith(_BEGIN[kind])
-            if begins or fits(first.unit, unit):
+            if begins or units.fits(first.unit, unit):
                 return {kind: first}
         return found
 
@@ -211,7 +195,8 @@ class Sheet:
         if kind in self.axes:
             return self.axes[kind]
         free = [one for one in self.of_numbers if one not in taken]
-        by_unit = [one for one in free if one.unit and fits(plain_unit(one.unit, unit), unit)]
+        named = [one for one in free if one.unit]
+        by_unit = [one for one in named if units.fits(plain_unit(one.unit, unit), unit)]
         by_name = [one for one in free if one.name.lower().startswith(_BEGIN[kind])]
         for found in (by_unit, by_name if not by_unit else [], free):
             if len(found) == 1 or (found and kind in AXES and found is free):

@@ -231,13 +231,9 @@ def _body(own: Sequence[DrawnPoint], frame: _Frame, size: float) -> Content:
     places = {one.name: frame.local(one) for one in own}
     centre = [round(sum(place[k] for place in places.values()) / len(places), 12) for k in (0, 1)]
     spread = sum(math.dist(place, centre) ** 2 for place in places.values()) / len(places)
-    return {
-        "mass": MASS,
-        "inertia": round(MASS * (spread or (0.1 * size) ** 2 / 12.0), 15),
-        "center": centre,
-        "start_angle": _degrees(frame.angle),
-        "points": places,
-    }
+    inertia = round(MASS * (spread or (0.1 * size) ** 2 / 12.0), 15)
+    turned = {"start_angle": _degrees(frame.angle), "points": places}
+    return {"mass": MASS, "inertia": inertia, "center": centre, **turned}
 
 
 def _degrees(angle: float) -> str:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from types import NoneType
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -25,11 +26,8 @@ def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, flo
 def numbers_of(table: Table, name: str) -> dict[str, Array | float]:
     """Entries of a table that are numbers, ``NAME_ENTRY``; numbers or arrays of samples."""
     entries = {entry: getattr(table, entry, None) for entry in type(table).model_fields}
-    return {
-        f"{name}_{entry}": value
-        for entry, value in entries.items()
-        if not (value is None or isinstance(value, (str, bool, tuple, Table)))
-    }
+    others = (str, bool, tuple, Table, NoneType)
+    return {f"{name}_{n}": one for n, one in entries.items() if not isinstance(one, others)}
 
 
 class JointEffect(Table):
@@ -92,10 +90,9 @@ class JointLoad(Load):
 
 def loads_of(joints: Iterable[Any]) -> tuple[JointLoad, ...]:
     """Effects of joints, as loads."""
+    made = JointLoad.model_construct
     return tuple(
-        JointLoad.model_construct(
-            name=f"{joint.name}_{entry}", entry=entry, joint=joint, effect=effect
-        )
+        made(name=f"{joint.name}_{entry}", entry=entry, joint=joint, effect=effect)
         for joint in joints
         for entry in type(joint).model_fields
         if isinstance(effect := getattr(joint, entry), JointEffect)
