@@ -144,8 +144,7 @@ def _of_variables(text: str) -> ast.expr:
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             power = number_of(node.right)
             if power is None or not 0 <= power <= MOST_POWER:
-                reason = f"has a power that is not a number from 0 to {MOST_POWER:g}"
-                raise FormulaError(reason)
+                raise FormulaError(f"has a power that is not a number from 0 to {MOST_POWER:g}")
     return tree
 
 

@@ -196,8 +196,7 @@ def check_address_space(others: bool = False) -> None:
     limit = host.address_space_limit()
     least = LEAST_BESIDE_OTHERS if others else LEAST_ADDRESS_SPACE
     if limit is not None and limit < least * 2**20:
-        known = f"the limit of address space is {limit // 2**20} MB, it takes {least}"
-        raise _out_of_memory(known)
+        raise _out_of_memory(f"the limit of address space is {limit // 2**20} MB, it takes {least}")
 
 
 def mendable(error: BaseException) -> InputError | LimitError | None:

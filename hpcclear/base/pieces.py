@@ -29,9 +29,7 @@ class Pieces(NamedTuple):
         share = np.asarray(place, float) / self.length
         share = share - np.floor(share) if self.repeats else np.clip(share, 0.0, 1.0)
         k = np.searchsorted(self.starts, share, side="right") - 1
-        s = share - self.starts[k]
-        c0, c1, c2, c3 = np.moveaxis(self.cubics[k], -1, 0)
-        return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
+        return _values(self.cubics[k], share - self.starts[k])
 
     def mean(self) -> float:
         """Mean over the length, exact."""
@@ -173,7 +171,7 @@ def _approached(found: list[float], first: float, last: float) -> Array:
 
 
 def _values(cubics: Array, s: Array) -> Array:
-    c0, c1, c2, c3 = cubics.T
+    c0, c1, c2, c3 = np.moveaxis(cubics, -1, 0)
     return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
 
 

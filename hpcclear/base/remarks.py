@@ -8,11 +8,7 @@ from hpcclear.base.plain import plain
 _made: set[str] = set()
 
 
-def _on_standard_error(text: str) -> None:
-    sys.stderr.write(f"{plain(text)}\n")
-
-
-_listeners: list[Callable[[str], object]] = [_on_standard_error]
+_listeners: list[Callable[[str], object]] = [lambda text: sys.stderr.write(f"{plain(text)}\n")]
 
 
 def listen(listener: Callable[[str], object]) -> None:

@@ -95,5 +95,4 @@ class FitClearance:
         """Quantiles, of any shape."""
         places, shares = self._table
         below, above = np.interp(self.span, places, shares)
-        found = np.interp(below + chance * (above - below), shares, places)
-        return np.clip(found, *self.span)
+        return np.clip(np.interp(below + chance * (above - below), shares, places), *self.span)

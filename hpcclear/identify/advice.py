@@ -64,8 +64,7 @@ def _expected(
     seen = ensemble.spectrum(name)
     variance = noise_of(seen, share, SAMPLES) + seen.variance.mean(axis=0)
     typical = Spectrum(seen.mean.mean(axis=0), variance, count)
-    measured = Measured(name, typical, True, frequency, ORDERS)
-    layout = Layout.of(measured, sensor)
+    layout = Layout.of(Measured(name, typical, True, frequency, ORDERS), sensor)
     features, own = members_of(ensemble, [layout], sensor, frequency)
     noise = layout.values(typical, measured=True)[1]
     seen_features = as_measured(features, own, noise, np.random.default_rng([seed, 0x6164]))

@@ -140,6 +140,5 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
     wide[:, :unknowns] = np.clip(middle + factor * (found[:, :unknowns] - middle), 0.0, 1.0)
     physical = inputs.values(wide[:, : inputs.size])
     interval = np.quantile(physical[:, :unknowns], LEVELS, axis=0)
-    score = np.abs(values - mean) / deviation
-    worst = int(np.argmax(score))
+    worst = int(np.argmax(np.abs(values - mean) / deviation))
     return Judgement(physical, interval, doubt, doubt < REFUSED, worst, values, mean, deviation)

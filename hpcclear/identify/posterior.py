@@ -141,8 +141,7 @@ class Calibration:
             fits.append(model.fit(model.rest[k], int(groups[k])))
         score = np.sort(np.array(out), axis=0)
         rank = min(int(np.ceil(0.95 * (count + 1))), count) - 1
-        widening = np.maximum(score[rank], 1.0)
-        return cls(widening, (score <= 1.0).mean(axis=0), np.array(fits))
+        return cls(np.maximum(score[rank], 1.0), (score <= 1.0).mean(axis=0), np.array(fits))
 
     def doubt(self, fit: float) -> float:
         """Logarithmic standard score of a fit among those of the members."""

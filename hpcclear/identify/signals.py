@@ -127,6 +127,5 @@ def spectra(scene: Scene, response: Results, names: Sequence[str]) -> Array:
     found = []
     for name in names:
         one = signal(response, name, "--signal")
-        each = harmonics(turns[kept], one.values[kept], one.counted)
-        found.append(Spectrum.of(each).packed())
+        found.append(Spectrum.of(harmonics(turns[kept], one.values[kept], one.counted)).packed())
     return np.array(found)

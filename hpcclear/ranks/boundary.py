@@ -246,8 +246,7 @@ def _ended(ranks: Ranks, error: BaseException | None) -> int:
         case SystemExit():
             code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
         case BaseException():
-            user_error = isinstance(mendable(error), InputError)
-            code = Exit.BAD_INPUT if user_error else Exit.FAILED
+            code = Exit.BAD_INPUT if isinstance(mendable(error), InputError) else Exit.FAILED
             text = _report(ranks, error)
     if text or note:
         ranks.stop_switch.reported = True

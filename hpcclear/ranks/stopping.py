@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable
 from enum import IntEnum
-from types import FrameType
 
 from hpcclear.base.host import STOP_SIGNALS
 from hpcclear.ranks.launcher import launched_rank
@@ -116,8 +115,8 @@ class StopSwitch:
         mouth.setblocking(False)
         self._mouth = mouth
         self._previous_fd = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
-        for number in STOP_SIGNALS:
-            self._previous[number] = signal.signal(number, _leave_it_to_the_thread)
+        for number in STOP_SIGNALS:  # Python writes the number to the socket before it calls this
+            self._previous[number] = signal.signal(number, lambda number, frame: None)
         self._thread = threading.Thread(target=self._listen, name="stop-switch", daemon=True)
         self._thread.start()
         return self
@@ -176,7 +175,3 @@ class StopSwitch:
         threading.Thread(target=self.last_resort, args=(code,), daemon=True).start()
         time.sleep(0.5)  # the last resort may be an MPI call, and hang
         os._exit(code)
-
-
-def _leave_it_to_the_thread(number: int, frame: FrameType | None) -> None:
-    """Python writes the signal's number to the wake-up socket before it calls this."""

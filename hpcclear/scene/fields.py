@@ -76,6 +76,13 @@ def check_known(name: str, known: Collection[str], reason: str, key: str = "") -
         raise invalid(f"{name!r} {reason}", nearest(name, tuple(known)), key)
 
 
+def table_at(content: object, path: str) -> Tables:
+    """The table at a dotted path of tables that are not validated yet; empty where none is."""
+    for key in path.split("."):
+        content = content.get(key) if isinstance(content, Mapping) else None
+    return content if isinstance(content, Mapping) else {}
+
+
 def checked_table(data: object) -> Mapping[str, object]:
     """A table whose keys are strings; an error for validators where it is none."""
     if not isinstance(data, Mapping):

@@ -111,8 +111,7 @@ def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
     if angles[-1] - angles[0] < TURN:
         angles = np.concatenate([angles + k * TURN for k in range(turns)])
         values = np.tile(values, turns)
-    angles = angles + curve.zero
-    return [[float(a), float(v)] for a, v in zip(angles, values, strict=True)], shown
+    return [[float(a), float(v)] for a, v in zip(angles + curve.zero, values, strict=True)], shown
 
 
 def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:

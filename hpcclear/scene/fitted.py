@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Content, Quantity, Tables, invalid
+from hpcclear.scene.fields import Content, Quantity, Tables, invalid, table_at
 from hpcclear.scene.fits import INSTEAD, with_clearance
 from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
@@ -26,11 +26,11 @@ def with_shares(content: Tables) -> Tables:
     where the study varies that, it stays a share, and the input is `relative`. An error for validators if the number is not
     there.
     """
-    rows = _at(content, "study.random")
-    for name, row in rows.items() if isinstance(rows, Mapping) else ():
+    variables = table_at(content, "study.variables")
+    for name, row in table_at(content, "study.random").items():
         if not isinstance(row, Mapping):
             continue
-        variable = _at(content, f"study.variables.{name}")
+        variable = variables.get(name)
         given = row.keys() & {"path", "paths"}
         own = row if given or not isinstance(variable, Mapping) else variable
         path = next(iter(paths_of(name, own)), "")
@@ -75,16 +75,15 @@ def note_share(share: str, unit: str, about: str) -> None:
 def _number(content: Tables, path: str) -> object:
     """What a file has at a path, a clearance by its fit, too."""
     owner, _, leaf = path.rpartition(".")
-    table = _at(content, owner)
-    return with_clearance(table).get(leaf) if isinstance(table, Mapping) else None
+    return with_clearance(table_at(content, owner)).get(leaf)
 
 
 def entry_replaced(content: Tables, path: str, value: object) -> Content:
     """The content of a scene with an entry replaced, and without what it stands in place of: a fit takes a clearance's."""
     owner, _, leaf = path.rpartition(".")
-    before = _at(content, owner)
+    before = table_at(content, owner)
     made = replace(content, path, value)
-    if leaf not in INSTEAD or value is None or not isinstance(before, Mapping):
+    if leaf not in INSTEAD or value is None or not before:
         return made
     if leaf in ("clearance", "bearing_radius") and "fit" in before:
         before = with_clearance(before)
@@ -97,19 +96,12 @@ def entry_replaced(content: Tables, path: str, value: object) -> Content:
     return made
 
 
-def _at(content: object, path: str) -> object:
-    for key in path.split("."):
-        content = content.get(key) if isinstance(content, Mapping) else None
-    return content
-
-
 def _rows_of_fits(
     content: Tables,
 ) -> Iterator[tuple[str, Tables, list[Tables]]]:
     """Random inputs of the distribution "fit": names, rows, and the open joints whose clearances they drive."""
-    rows = _at(content, "study.random")
-    for name, row in rows.items() if isinstance(rows, Mapping) else ():
+    for name, row in table_at(content, "study.random").items():
         if isinstance(row, Mapping) and row.get("distribution") == "fit":
-            owners = [path.rpartition(".")[0] for path in paths_of(name, row)]
-            joints = [one for one in (_at(content, o) for o in owners) if isinstance(one, Mapping)]
+            owners = (path.rpartition(".")[0] for path in paths_of(name, row))
+            joints = [table for owner in owners if (table := table_at(content, owner))]
             yield name, row, [one for one in joints if one.get("kind") != "ideal"]

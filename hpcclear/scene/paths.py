@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from hpcclear.base.errors import InputError
 from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import Content, NamedRows, Quantity, Tables
+from hpcclear.scene.fields import Content, NamedRows, Quantity, Tables, table_at
 from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
@@ -56,9 +56,7 @@ _SEEN: dict[str, str] = {}
 @contextmanager
 def of_kinds(content: Tables) -> Iterator[None]:
     """Within it, `quantities` knows the kinds of the loads of a scene's content, on which units of their entries depend."""
-    mechanism = content.get("mechanism")
-    loads = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
-    rows = loads.items() if isinstance(loads, Mapping) else ()
+    rows = table_at(content, "mechanism.loads").items()
     kinds = {name: str(row.get("kind")) for name, row in rows if isinstance(row, Mapping)}
     found = {f"mechanism.loads.{name}": kind for name, kind in kinds.items()}
     _SEEN.update(found)

@@ -139,8 +139,7 @@ class PlanarBody(Table):
             ):
                 if getattr(self, key) is not None:
                     reason = f"{meaning}, and this body has no length"
-                    remedy = f"Give its length, or write {instead}"
-                    raise invalid(reason, remedy, key)
+                    raise invalid(reason, f"Give its length, or write {instead}", key)
             return
         if self.inertia_ratio is not None and self.inertia:
             reason = "is given beside the inertia itself"

@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import REFERENCE, SCIPY, digest, is_trusting
-from hpcclear.scene.fields import Converted, NamedRows, Table, Tables, invalid
+from hpcclear.scene.fields import Converted, NamedRows, Table, Tables, invalid, table_at
 
 
 class UntrustedSource(InputError):
@@ -75,9 +75,7 @@ def as_invalid(key: str = "") -> Iterator[None]:
 
 def texts_of(content: Tables) -> dict[str, str]:
     """Source texts that the content of a scene carries, by module; whatever else stands there."""
-    table = content.get("plugins")
-    rows = table.get("files") if isinstance(table, Mapping) else None
-    rows = rows.items() if isinstance(rows, Mapping) else ()
+    rows = table_at(content, "plugins.files").items()
     texts = {str(name): row.get("source") for name, row in rows if isinstance(row, Mapping)}
     return {name: text for name, text in texts.items() if isinstance(text, str)}
 

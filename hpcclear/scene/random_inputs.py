@@ -248,16 +248,13 @@ class RandomInput(NamedInput):
         offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
             row["range"] = offset.range(row["range"], "range")
-        for key in ("mean", "location"):
+        share = Quantity("" if row.get("relative") else quantity.unit, above=0)
+        for key, own in {
+            "mean": offset, "location": Quantity(quantity.unit), "half_width": share, "deviation": share,
+            "scale": Quantity(quantity.unit, above=0), "shape": _SHAPE,
+        }.items():  # fmt: skip
             if key in row:
-                own = Quantity(quantity.unit) if key == "location" else offset
                 row[key] = own.convert(row[key], key)
-        for key in ("half_width", "deviation", "scale"):
-            if key in row:
-                unit = "" if row.get("relative") and key != "scale" else quantity.unit
-                row[key] = Quantity(unit, above=0).convert(row[key], key)
-        if "shape" in row:
-            row["shape"] = _SHAPE.convert(row["shape"], "shape")
         if "shapes" in row:
             row["shapes"] = _SHAPE.several(row["shapes"], "shapes", 2, 2)
         if "values" in row:

@@ -47,8 +47,7 @@ def latin_hypercube(
     study = scene.required_study
     count = _count(study, samples)
     region = box(scene, names)
-    rng = generator(study.seed, f"lhs {purpose}")
-    unit = unit_lhs(count, len(region.names), rng)
+    unit = unit_lhs(count, len(region.names), generator(study.seed, f"lhs {purpose}"))
     coordinates = region.lower + unit * (region.upper - region.lower)
     for column, name in enumerate(region.names):
         if (options := study.variable(name).options) is not None:
@@ -75,8 +74,7 @@ def _chances(
         rng = generator(seed, f"stratified {purpose}")
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
     if replicates is None:
-        label = f"monte-carlo {purpose}"
-        return [uniform(seed, label, name, first, count) for name in names]
+        return [uniform(seed, f"monte-carlo {purpose}", name, first, count) for name in names]
     parts = [_scrambled(seed, purpose, one, len(names), span) for one in replicates]
     return list(np.concatenate(parts).T)
 
@@ -84,8 +82,7 @@ def _chances(
 @lru_cache(maxsize=64)
 def _scrambled(seed: int, purpose: str, replicate: int, size: int, span: tuple[int, int]) -> Array:
     """Points of a randomised sequence, (count, size), read only: all designs of a study meet the same."""
-    rng = generator(seed, f"sobol {purpose}", str(replicate))
-    points = sobol(size, rng, *span)
+    points = sobol(size, generator(seed, f"sobol {purpose}", str(replicate)), *span)
     points.flags.writeable = False
     return points
 

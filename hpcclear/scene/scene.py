@@ -18,7 +18,7 @@ from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fields import Content
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import curve_at, flatten, replace
-from hpcclear.scene.validation import check_path, scene_of
+from hpcclear.scene.validation import dotted, scene_of
 
 
 class Scene(ConsistentTables):
@@ -141,7 +141,9 @@ class Scene(ConsistentTables):
         content = self.resolved()
         altered = {path: unboxed(one) for path, one in {**(changes or {}), **more}.items()}
         for path, value in altered.items():
-            check_path(path)
+            if not dotted(path):
+                reason = "is not a dotted path"
+                raise InputError("path", path, reason, "Write, say, mechanism.rod.mass")
             content = entry_replaced(content, path, value)
         result = scene_of(Scene, content, self)
         known = {one.entry for one in result._readings}

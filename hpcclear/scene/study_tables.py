@@ -163,8 +163,7 @@ class StudyTables(Table):
     def design_variables(self, case: str) -> stages.Names:
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""
         rows = {row.name: row for row in self.random}
-        random = self.case(case).random
-        fixed = {name for name in random if rows[name].absolute}
+        fixed = {name for name in self.case(case).random if rows[name].absolute}
         return tuple(name for name in self.optimisation if name not in fixed)
 
     def own_entries(self, variable: StudyVariable) -> tuple[str, ...]:

@@ -38,8 +38,7 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
     ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths
     if film.law.further is not None and not least <= ratio <= most:
         reason = f"is for lengths of {least:g} to {most:g} diameters, and this is {ratio:.3g} long"
-        remedy = 'Take "short"' if ratio < 1.0 else 'Take "long"'
-        raise invalid(reason, remedy, "film.model")
+        raise invalid(reason, 'Take "short"' if ratio < 1.0 else 'Take "long"', "film.model")
     if 4.0 * film.roughness > clearance:
         most_rough = f"a quarter of the clearance ({shown(clearance, 'm')})"
         reason = f"must be at most {most_rough}, or no film is left"

@@ -188,8 +188,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         entry = speed_entry(drive)
         table = {name: getattr(drive, name) for name in names}
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
-        moved = {f"{key}.{entry}": f"{key}.speed"}
-        yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
+        yield Switch(f"speed fluctuation{whose}", {key: table}, {f"{key}.{entry}": f"{key}.speed"})
         if drive.torque is not None:
             yield from _mean(scene, f"torque{whose}", f"{key}.torque", drive.torque, 0)
 

@@ -46,12 +46,6 @@ def dotted(path: object) -> bool:
     return isinstance(path, str) and _KEY.fullmatch(path) is not None and path.count(".") < DEEPEST
 
 
-def check_path(path: object) -> None:
-    """InputError unless this is a dotted path."""
-    if not dotted(path):
-        raise InputError("path", path, "is not a dotted path", "Write, say, mechanism.rod.mass")
-
-
 def validated(model: type[Valid], content: Tables) -> Valid:
     """Tables as a model of its kind.
 

@@ -39,10 +39,6 @@ _UNREADABLE = (
 """What damaged archives and XML raise."""
 
 
-class _Enough(Exception):
-    """The rest of a part is of no use."""
-
-
 def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> Rows:
     """Numbers and cells of the rows of a sheet that are not empty.
 
@@ -80,16 +76,12 @@ class _Book:
         relations = self._relations(root)
         ids = {id_: target for id_, _, target in relations}
         sheets, since_1904 = list[tuple[str, str]](), False
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            nonlocal since_1904
-            if _local(tag) == "sheet":
+        for tag, attributes in self._started(root):
+            if tag == "sheet":
                 own = (v for k, v in attributes.items() if k.endswith("id") and k != "sheetId")
                 sheets.append((attributes.get("name", ""), ids.get(next(own, ""), "")))
-            elif _local(tag) == "workbookPr":
+            elif tag == "workbookPr":
                 since_1904 = attributes.get("date1904") in ("1", "true")
-
-        self.parse(root, start)
         if len(sheets) > MOST_SHEETS:
             self.refuse(f"has more than {MOST_SHEETS} sheets")
         known = {target for _, kind, target in relations if kind == "worksheet"}
@@ -120,8 +112,9 @@ class _Book:
     def parse(
         self, name: str, start: Callable[[str, dict[str, str]], object], end: Callable[[str], object] | None = None,
         text: Callable[[str], object] | None = None,
-    ) -> None:  # fmt: skip
-        """Read the XML of a part; tags come as written. Declarations of entities, which may expand, are refused."""
+    ) -> Iterator[bytes]:  # fmt: skip
+        """Read the XML of a part, a piece of it after the other, each yielded when it was read; tags come as written.
+        Declarations of entities, which may expand, are refused."""
 
         def declared(*_: object) -> None:
             raise ValueError("declares a document type")
@@ -132,29 +125,31 @@ class _Book:
         parser.EndElementHandler = end
         parser.CharacterDataHandler = text
         parser.StartDoctypeDeclHandler = declared
-        try:
-            for data in self.chunks(name):
-                parser.Parse(data)
-            parser.Parse(b"", True)
-        except _Enough:
-            pass
+        for data in self.chunks(name):
+            parser.Parse(data)
+            yield data
+        parser.Parse(b"", True)  # which may read what was kept back
+        yield b""
+
+    def _started(self, name: str) -> Iterator[tuple[str, dict[str, str]]]:
+        """Tags without prefixes, and attributes, of the elements of a part in the order in which they begin."""
+        found = list[tuple[str, dict[str, str]]]()
+        for _ in self.parse(name, lambda tag, attributes: found.append((_local(tag), attributes))):
+            yield from found
+            found.clear()
 
     def _relations(self, part: str) -> list[tuple[str, str, str]]:
         """Id, last word of the kind and target of the relationships of a part; "" for the workbook itself."""
         place = PurePosixPath(part)
         name = str(place.parent / "_rels" / f"{place.name}.rels") if part else "_rels/.rels"
         found = list[tuple[str, str, str]]()
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            if _local(tag) == "Relationship":
+        for tag, attributes in self._started(name) if name in self.archive.NameToInfo else ():
+            if tag == "Relationship":
                 target = posixpath.join("/", place.parent, attributes.get("Target", ""))
                 whole = posixpath.normpath(target)[1:]
                 if whole in self.archive.NameToInfo:
                     kind = attributes.get("Type", "").rpartition("/")[2]
                     found.append((attributes.get("Id", ""), kind, whole))
-
-        if name in self.archive.NameToInfo:
-            self.parse(name, start)
         return found
 
     def _read_texts(self, part: str) -> None:
@@ -170,23 +165,19 @@ class _Book:
             if text.end(_local(tag)) == "si":
                 self.texts.append(text.take())
 
-        self.parse(part, start, end, text.parts.append)
+        for _ in self.parse(part, start, end, text.parts.append):
+            pass
 
     def _read_formats(self, part: str) -> None:
-        own: dict[str, str] = {}
-        within = [""]
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            tag = _local(tag)
+        own, within = dict[str, str](), ""
+        for tag, attributes in self._started(part):
             if tag == "numFmt":
                 code = attributes.get("formatCode", "")
                 own[attributes.get("numFmtId", "")] = code[:LONGEST_CELL]
             elif tag in ("cellXfs", "cellStyleXfs"):
-                within[0] = tag
-            elif tag == "xf" and within[0] == "cellXfs" and len(self.formats) < MOST_CELLS:
+                within = tag
+            elif tag == "xf" and within == "cellXfs" and len(self.formats) < MOST_CELLS:
                 self.formats.append(clock.kind_of_format(attributes.get("numFmtId", "0"), own))
-
-        self.parse(part, start)
 
     def chosen(self, sheet: str | None) -> str:
         """The part of the sheet that is named, or of the only one that holds something."""
@@ -206,18 +197,14 @@ class _Book:
 
     def _is_filled(self, part: str) -> bool:
         """Whether some cell of a sheet holds something; no more is read."""
-        seen, rows = False, 0
-
-        def start(tag: str, _: object) -> None:
-            nonlocal seen, rows
-            rows += (tag := _local(tag)) == "row"
+        rows = 0
+        for tag, _ in self._started(part):
+            if tag in ("v", "t", "f"):
+                return True
+            rows += tag == "row"
             if rows > MOST_ROWS:
                 self.refuse(f"has more than {MOST_ROWS} rows")
-            if seen := tag in ("v", "t", "f"):
-                raise _Enough
-
-        self.parse(part, start)
-        return seen
+        return False
 
 
 def _local(tag: str) -> str:
@@ -285,7 +272,8 @@ class _Page:
         self.formula: str | None = None
         self.text = _Text()
         self.parts = self.text.parts
-        book.parse(part, self._start, self._end, self.parts.append)
+        for _ in book.parse(part, self._start, self._end, self.parts.append):
+            pass
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         if ":" in tag:

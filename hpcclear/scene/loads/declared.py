@@ -144,13 +144,11 @@ class SizedLoad(Load):
         if timed is not None and size is not None:
             raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
         if self.angle_of is not None and not isinstance(size, tuple):
-            reason = f"there is no table of {entry} against an angle"
-            raise invalid(reason, "Remove it", "angle_of")
+            raise invalid(f"there is no table of {entry} against an angle", "Remove it", "angle_of")
         if not self.repeats:
             return
         if timed is None:
             raise invalid(f"there is no {entry}_by_time", "Remove it", "repeats")
         if timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]:
             reason = "a table that repeats begins at 0 s, and ends at the value of its beginning"
-            remedy = "Make its first and last value equal"
-            raise invalid(reason, remedy, f"{entry}_by_time")
+            raise invalid(reason, "Make its first and last value equal", f"{entry}_by_time")
