@@ -82,7 +82,7 @@ PROBLEMS: dict[str, tuple[Function, int, int]] = {
 TARGETS = {"ZDT1": 0.8700, "ZDT2": 0.5379, "ZDT3": 1.3265, "DTLZ2": 0.7290}
 
 
-RUNS = ("problem", "algorithm", "seed")
+RUNS = "problem algorithm seed"
 VARIABLES: FileVariables = {
     "hypervolume": number(RUNS, "1", "hypervolume of the cut front, reference point 1.1"),
     "igd_plus": number(RUNS, "1", "IGD+ of the cut front against the known front"),
@@ -182,7 +182,7 @@ def compare(methods: list[str], budget: int, seeds: list[int]) -> xr.Dataset:
 def _dataset(result: dict, fronts: np.ndarray, methods: list[str], seeds: list[int]) -> xr.Dataset:
     data: dict[str, Any] = dict(described(result, VARIABLES))
     data["front"] = (
-        (*RUNS, "solution", "objective"),
+        (*RUNS.split(), "solution", "objective"),
         fronts,
         {"long_name": "objectives of the cut front, NaN where absent", "units": "1"},
     )

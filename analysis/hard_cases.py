@@ -168,7 +168,7 @@ def uncertainty(scene: Scene) -> float:
     return float(evaluate_records(scene, NOTHING, 1, PERTURBATIONS)["objective_uncertainty"][0])
 
 
-CASES = ("case", "rtol")
+CASES = "case rtol"
 VARIABLES: FileVariables = {
     "objective": number(CASES, "m", "objective f"),
     "objective_spread": number(CASES, "m", "standard deviation of f between revolutions"),

@@ -164,8 +164,8 @@ from hpcclear.results.rows import ResultKind, count, number
 KIND = ResultKind(
     900, "Readings of an instrument", ("reading",),
     table={
-        "reading": count(("reading",), "number of the reading"),
-        "force": number(("reading",), "N", "force that was read", required=True),
+        "reading": count("reading", "number of the reading"),
+        "force": number("reading", "N", "force that was read", required=True),
     },
 )
 '''

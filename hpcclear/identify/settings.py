@@ -20,53 +20,36 @@ MOST = 1024
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `hpcclear.identify`; the command has an option for each.
-
-    Parameters
-    ----------
-    unknown : str or sequence of str
-        ``"PATH=LO:HI"``, such as ``"joints.crank_rod.clearance=10um:150um"``; uniform within the bounds beforehand.
-    signal : path or sequence of path
-        A table for each date, with time or crank angle first; none for advice alone.
-    of : str or sequence of str
-        Columns that are used together: series of a response, ``frame_force_x``, ``acceleration_x BODY.POINT`` or
-        ``impacts JOINT``.
-    date : str or sequence of str
-        ISO dates of the tables, for the rate of growth.
-    limit : float or str, optional
-        Of the unknowns, SI or with a unit: the time until it is reached.
-    band : str, optional
-        ``"LO:HI"``: frequencies that the sensor passes, Hz; the upper one is that of its anti-aliasing filter.
-    resonance : str, optional
-        ``"HZ:Q"``: mounting resonance and its quality factor, 10 without it.
-    gain_error : float
-        Standard deviation of the sensor's calibration factor, relative.
-    angle_error : float or str
-        Standard deviation of the crank-angle reference, rad or with a unit.
-    noise : float, optional
-        Standard deviation of the sensor's noise in a sample over the RMS of the signal. With it, the scatter between
-        revolutions is a feature.
-    pressure : str
-        ``"COLUMN=AREA"``: a measured pressure in the first table as a known load on the slider of a slider-crank.
-    advise : bool
-        Whether other signals are compared: expected half-widths by signal and number of revolutions.
-    members : int, optional
-        Simulations, a power of two; 256 for one unknown by default, doubled by each further one.
-    """
+    """Settings of `hpcclear.identify`; the command has an option for each."""
 
     unknown: str | Sequence[str]
+    """``"PATH=LO:HI"``, such as ``"joints.crank_rod.clearance=10um:150um"``; uniform within the bounds beforehand."""
     signal: str | Path | Sequence[str | Path] = ()
+    """A table for each date, with time or crank angle first; none for advice alone."""
     of: str | Sequence[str] = "crank_moment"
+    """Columns that are used together: series of a response, ``frame_force_x``, ``acceleration_x BODY.POINT`` or
+    ``impacts JOINT``."""
     date: str | Sequence[str] = ()
+    """ISO dates of the tables, for the rate of growth."""
     limit: float | str | None = None
+    """Of the unknowns, SI or with a unit: the time until it is reached."""
     band: str | None = None
+    """``"LO:HI"``: frequencies that the sensor passes, Hz; the upper one is that of its anti-aliasing filter."""
     resonance: str | None = None
+    """``"HZ:Q"``: mounting resonance and its quality factor, 10 without it."""
     gain_error: float = 0.0
+    """Standard deviation of the sensor's calibration factor, relative."""
     angle_error: float | str = 0.0
+    """Standard deviation of the crank-angle reference, rad or with a unit."""
     noise: float | None = None
+    """Standard deviation of the sensor's noise in a sample over the RMS of the signal. With it, the scatter between
+    revolutions is a feature."""
     pressure: str = ""
+    """``"COLUMN=AREA"``: a measured pressure in the first table as a known load on the slider of a slider-crank."""
     advise: bool = False
+    """Whether other signals are compared: expected half-widths by signal and number of revolutions."""
     members: int | None = None
+    """Simulations, a power of two; 256 for one unknown by default, doubled by each further one."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:

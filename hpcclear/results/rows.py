@@ -115,26 +115,26 @@ class ResultKind:
         return {name for name, row in self.data.items() if row.required}
 
 
-def number(dims: Dims, units: str, long_name: str, *, required: bool = False) -> FileVariable:
-    """A number of double precision."""
-    return FileVariable(dims, units, long_name, "f8", required)
+def number(dims: str, units: str, long_name: str, *, required: bool = False) -> FileVariable:
+    """A number of double precision; `dims`: its dimensions, separated by blanks, as of all rows below."""
+    return FileVariable(tuple(dims.split()), units, long_name, "f8", required)
 
 
-def count(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
+def count(dims: str, long_name: str, *, required: bool = False) -> FileVariable:
     """A whole number."""
-    return FileVariable(dims, "1", long_name, "i8", required)
+    return FileVariable(tuple(dims.split()), "1", long_name, "i8", required)
 
 
 def flag(
-    dims: Dims, long_name: str, codes: type[IntEnum] | str, *, required: bool = False
+    dims: str, long_name: str, codes: type[IntEnum] | str, *, required: bool = False
 ) -> FileVariable:
     """A small code, whose meanings (`FlagCodes.of`) are attributes."""
-    return FileVariable(dims, "", long_name, "i1", required, FlagCodes.of(codes))
+    return FileVariable(tuple(dims.split()), "", long_name, "i1", required, FlagCodes.of(codes))
 
 
-def text(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
+def text(dims: str, long_name: str, *, required: bool = False) -> FileVariable:
     """Words."""
-    return FileVariable(dims, "", long_name, "text", required)
+    return FileVariable(tuple(dims.split()), "", long_name, "text", required)
 
 
 _CODES = {one.__name__.lower(): FlagCodes.of(one) for one in (Regime, Status)}
@@ -154,7 +154,7 @@ def outcome(*per_sample: str) -> FileVariables:
 
 
 def estimate(
-    name: str, dims: Dims, units: str, words: str, true: str = "", level: str = "", *, required: bool = False
+    name: str, dims: str, units: str, words: str, true: str = "", level: str = "", *, required: bool = False
 ) -> FileVariables:  # fmt: skip
     """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper.
 
@@ -167,7 +167,7 @@ def estimate(
 
 
 def with_error(
-    name: str, dims: Dims, units: str, words: str, required: bool = False
+    name: str, dims: str, units: str, words: str, *, required: bool = False
 ) -> FileVariables:
     """A number, `required` or not, and its standard error as NAME_error."""
     error = number(dims, units, f"standard error of {name}")

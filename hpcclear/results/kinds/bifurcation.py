@@ -7,8 +7,8 @@ KIND = ResultKind(
     30, "One value for each revolution, against an entry of the scene", ("value", "crossing"),
     design_dims=("value",), alone=True,
     table={
-        "value": count(("value",), "number of the value"),
-        "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
-        "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
+        "value": count("value", "number of the value"),
+        "crossing": count("crossing", "number of the revolution, the first after the transient"),
+        "observed": number("value crossing", "objective", MEAN_GAP.words, required=True),
     },
 )
