@@ -148,7 +148,7 @@ def test_a_link_in_place_of_the_directory_is_refused(tmp_path):
 
 def leave(folder: Path, **changes: object) -> Path:
     """A lock file as a killed run leaves it."""
-    holder = {**Holder.this_process().__dict__, **changes}
+    holder = {**Holder.this_process()._asdict(), **changes}
     path = folder / ".hpcclear.lock"
     path.write_text(json.dumps(holder))
     return path

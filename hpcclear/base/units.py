@@ -21,18 +21,8 @@ from fractions import Fraction
 from functools import lru_cache
 from math import isfinite, pi
 
-from hpcclear.base.unit_names import (
-    HEADS,
-    LONGEST,
-    SPELLINGS,
-    TAILS,
-    UNITS,
-    NoUnit,
-    dimensions,
-    factors_of,
-    parsed,
-    tidy,
-)
+from hpcclear.base import unit_names
+from hpcclear.base.unit_names import HEADS, LONGEST, TAILS, UNITS, NoUnit
 from hpcclear.base.unit_names import UnitError as UnitError
 
 _NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
@@ -52,7 +42,7 @@ _MINUTES = {"min", "minute", "minutes"}
 def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
     """The unit with the letters of its names small or capital as in units that are known: those that fit."""
     try:
-        factors = factors_of(tidy(unit))
+        factors = unit_names.factors_of(unit_names.tidy(unit))
     except NoUnit:
         return []
     known = {name: name for name in UNITS}
@@ -77,8 +67,8 @@ def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
 @lru_cache(maxsize=256)
 def _fitting(unit: str, target: str) -> Fraction | None:
     """What one `unit` is in `target`; None where they are of different quantities. Raises ValueError."""
-    scale, base, names = parsed(unit)
-    own, wanted = dimensions(target)
+    scale, base, names = unit_names.parsed(unit)
+    own, wanted = unit_names.dimensions(target)
     angle, expected_angle = (one.get("radian", 0) for one in (base, wanted))
     alike = {**base, "radian": 0} == {**wanted, "radian": 0}
     hertz = {"second": -1} in names.values()
@@ -124,7 +114,7 @@ def _remedy(unit: str, target: str) -> str:
         return "Write a plain number"
     if target == "rad/s" and ("hz" in unit.casefold() or fits(unit, "Hz")):
         return f"{unit} may count turns or radians, 2 pi apart: write rpm, rad/s or turn/s"
-    with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
+    with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", unit_names.SPELLINGS.get(unit, unit))
     near = _respelled(unit, lambda text: text != unit and fits(text, target))
     if not near and with_force != unit and fits(with_force, target):
         near = [with_force]
@@ -158,7 +148,7 @@ def note(text: str, read: str) -> None:
 
 def note_turns(text: str, number: str, unit: str, target: str) -> None:
     """Note how `text` is read, where `number` of `unit`, which fits the target, is an angular speed in turns by time alone."""
-    if target == "rad/s" and "radian" not in parsed(unit)[1]:
+    if target == "rad/s" and "radian" not in unit_names.parsed(unit)[1]:
         turns = float(60 * Fraction(number) * factor(unit, target) / _TURN)
         note(text, f"{turns:.6g} rpm, revolutions per minute; for radians write rad/s")
 
@@ -269,7 +259,7 @@ def check_thousands(text: str) -> None:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit, of whatever quantity."""
     try:
-        return bool(parsed(text))
+        return bool(unit_names.parsed(text))
     except ValueError:
         return False
 
@@ -279,7 +269,7 @@ def _is_written(text: str, unit: str) -> bool:
     if unit.startswith("1") and not text[: text.rindex(unit)][-1:].isspace():
         return False
     try:
-        return bool(factors_of(tidy(unit)))
+        return bool(unit_names.factors_of(unit_names.tidy(unit)))
     except NoUnit:
         return False
 
