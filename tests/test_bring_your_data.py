@@ -230,7 +230,7 @@ def test_files_are_read_where_curves_are_only(tmp_path):
     base = load_scene(JOBS / "slider_crank.toml")
     with pytest.raises(InputError, match="no file is read here"):
         with_file(base, "mechanism.rod.mass", {"file": str(path)})
-    with pytest.raises(InputError, match="the name of a table is expected"):
+    with pytest.raises(InputError, match="no name of a table"):
         with_file(base, "effects.slider_load", {"file": 3})
     with pytest.raises(InputError, match="no such regular file"):
         with_file(base, "effects.slider_load", {"file": "none.csv", "bore": 1})

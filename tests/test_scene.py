@@ -114,7 +114,7 @@ def test_with_validates_and_keeps_the_original(scene: Scene) -> None:
     assert scene.with_({"effects.friction": "none"}).effects.friction.law == "none"
     with pytest.raises(InputError, match="bearing radius"):
         scene.with_({"joints.crank_rod.clearance": 0.03})
-    with pytest.raises(InputError, match="not a dotted path"):
+    with pytest.raises(InputError, match="no dotted path"):
         scene.with_({"joints..clearance": 0.03})
 
 

@@ -120,8 +120,7 @@ class _Reader:
                 reason = f"has the condition {_shown(node)} where a number is expected"
                 raise FormulaError(reason, "Write (a if condition else b)")
         allowed = "arithmetic" if self.words else "numbers, variables and + - * / **"
-        remedy = f'Write, say, "{self.example}"'
-        raise FormulaError(f"contains more than {allowed}: {_shown(node)}", remedy)
+        raise FormulaError(f"has more than {allowed}: {_shown(node)}", f'Write "{self.example}"')
 
     def condition(self, node: ast.expr) -> ast.expr:
         match node:
@@ -242,8 +241,7 @@ def folded(node: ast.expr, made: Callable[[], float]) -> ast.expr:
     except ValueError:  # such as the root of a negative number
         value = math.nan
     if math.isinf(value):
-        reason = f"has a number that is too large: {_shown(node)}"
-        raise FormulaError(reason, "Write a number below 1.8e308")
+        raise FormulaError(f"has a number too large: {_shown(node)}", "Write one below 1.8e308")
     if math.isnan(value):
         raise FormulaError(f"has a part without a real value: {_shown(node)}", "Correct it")
     return constant(value)

@@ -184,8 +184,7 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
         units = f", or a string with a unit{hint}" if target else ""
         raise UnitError(reason, mended(text) or f"Write a number in {shown}{units}")
     if unit is None:
-        reason = "a number in quotes has no unit"
-        raise UnitError(reason, f"Drop the quotes for a number in {shown}")
+        raise UnitError("a number in quotes has no unit", f"Drop the quotes of a number in {shown}")
     return number, unit
 
 
@@ -212,11 +211,9 @@ def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> fl
     try:
         value = upper * size.numerator / (lower * size.denominator)
     except OverflowError:
-        remedy = f"Write a finite number in {target or '1'}"
-        raise UnitError("the number is too large", remedy) from None
+        raise UnitError("it is too large", f"Write a finite number in {target or '1'}") from None
     if upper and not value:
-        reason = "the number is too small"
-        raise UnitError(reason, f"Write 0, or a larger number in {target or '1'}")
+        raise UnitError("it is too small", f"Write 0, or a larger number in {target or '1'}")
     return value
 
 

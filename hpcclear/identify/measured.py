@@ -65,8 +65,7 @@ def read_measured(
         remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
         raise InputError("--signal", str(path), "has neither time nor crank angle", remedy)
     if (np.diff(place) <= 0.0).any():
-        reason = "time or crank angle does not rise"
-        raise InputError("--signal", str(path), reason, "Sort its rows")
+        raise InputError("--signal", str(path), "its time or angle does not rise", "Sort its rows")
     if not np.isfinite(values).all():
         raise InputError("--signal", str(path), "has cells without a number", "Remove these rows")
     found = harmonics(place, values, count) if place[-1] - place[0] >= 1.0 else np.empty((0, 1))
@@ -98,8 +97,7 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     area = number_of("--pressure", size, "m^2")
     found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage))
     if not found.synchronised:
-        remedy = 'Add a column "crank_angle [deg]"'
-        raise InputError("--pressure", str(path), "has no crank angle", remedy)
+        raise InputError("--pressure", str(path), "has no crank angle", 'Add "crank_angle [deg]"')
     share = np.arange(PAIRS) / PAIRS
     order = np.arange(float(found.highest + 1))
     mean = found.spectrum.mean[: found.highest + 1]

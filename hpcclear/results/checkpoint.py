@@ -262,8 +262,7 @@ class Checkpoint:
             discard(self.directory)
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
-            reason = "it is a symbolic link"
-            raise InputError("output", str(self.directory), reason, "Remove the link")
+            raise InputError("output", str(self.directory), "is a symbolic link", "Remove the link")
         number = 0
         for path in sorted(self.directory.iterdir()):
             match = _PART.fullmatch(path.name)

@@ -264,6 +264,5 @@ def each_in(directory: Path) -> Iterator[tuple[Path, Results | InputError]]:
 def _path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if "\0" in text:
-        reason = "a path cannot contain a NUL character"
-        raise InputError("file", text, reason, "Choose another name")
+        raise InputError("file", text, "contains a NUL character", "Choose another name")
     return Path(text)

@@ -20,8 +20,7 @@ class ShortText(Converted):
             raise invalid("a text is expected here", 'Write it in quotation marks: "B"')
         text = value.strip()
         if not (0 < len(text) <= LONGEST and text.isprintable()):
-            reason = f"must be one line of 1 to {LONGEST} letters"
-            raise invalid(reason, "Shorten it, or remove the entry")
+            raise invalid(f"must be one line of 1 to {LONGEST} letters", "Shorten it, or remove it")
         return text
 
     def json_schema(self) -> dict[str, Any]:

@@ -54,8 +54,7 @@ class Goal(Table):
 
     def _check(self) -> None:
         if (self.statistic is None) == (self.formula is None):
-            reason = "either a statistic or a formula is expected here"
-            raise invalid(reason, 'Write statistic = "mean", say')
+            raise invalid("a statistic or formula is needed here", 'Write statistic = "mean", say')
         if self.formula is not None:
             with at("formula", self.formula[:80]):
                 names_in(self.formula)
@@ -213,8 +212,7 @@ class Case(Table):
             raise invalid("a case needs an objective", remedy, "objectives")
         if len(rows) > len(ENDS):
             reason = f"with more than {len(ENDS)} objectives nearly every design is on the front"
-            remedy = "Use constraints for some of them, or combine some in one formula"
-            raise invalid(reason, remedy, "objectives")
+            raise invalid(reason, "Use constraints, or combine some in one formula", "objectives")
         for k, goal in enumerate(rows):
             if any(goal.same_as(other) for other in rows[:k]):
                 reason = "is an objective already"

@@ -61,8 +61,9 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
             first = last = now
         if (day is None, zoned) != (first[0] is None, first[3]):
             reason = "is a time of another kind than those above it"
-            remedy = "Write date, time and zone of each row in one way"
-            raise InputError(where(row), cell, reason, remedy)
+            raise InputError(
+                where(row), cell, reason, "Write date, time and zone of all rows alike"
+            )
         if day is None and last[1] - whole > (period := _period(found)) / 2:
             gone += period
         days = (day or 0) - (first[0] or 0)
@@ -78,8 +79,7 @@ def _period(found: re.Match[str] | None) -> int:
 
 def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> Moment:
     if found is None or not cell.strip():
-        reason = "is no clock time or date"
-        raise InputError(where, cell, reason, "Write it as 2026-03-01 12:03:05.2")
+        raise InputError(where, cell, "is no time or date", "Write it as 2026-03-01 12:03:05.2")
     day = None
     if found["date"]:
         day = _day(found["date"], order)
@@ -149,8 +149,7 @@ def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
         row, date = next(iter(open_.items()))
         days = [datetime.date.fromordinal(_day(date, one) or 1).isoformat() for one in fits]
         named = [f"{day} ({order})" for day, order in zip(days, fits, strict=True)]
-        reason = f"may be {' or '.join(named)}"
-        raise InputError(where(row), cells[row], reason, f"Write dates as {days[0]}")
+        raise InputError(where(row), cells[row], f"may be {' or '.join(named)}", f"Write {days[0]}")
     return (fits or orders)[0]
 
 

@@ -94,8 +94,7 @@ class ConsistentTables(SceneTables):
             return
         if self.slider_crank.slider.inertia is None:
             reason = "a slider in a guide with clearance can turn, so it needs an inertia"
-            remedy = "Write its moment of inertia about its pin in kg m2"
-            raise invalid(reason, remedy, "mechanism.slider.inertia")
+            raise invalid(reason, "Write it about its pin in kg m2", "mechanism.slider.inertia")
         (guide,) = (joint for joint in self.linkage.joints if joint.kind == "slide")
         with self._named_as_written("joints.guide"):
             guide.check()
@@ -164,8 +163,7 @@ class ConsistentTables(SceneTables):
             return
         why = "the confidence interval of a steady mean exists for the mean gap of all joints only"
         if self.numerics.objective_joints:
-            remedy = "Leave out the joints, or numerics.target_error"
-            raise invalid(why, remedy, key="numerics.objective_joints")
+            raise invalid(why, "Leave out the joints, or target_error", "numerics.objective_joints")
         named = self.numerics.objective if self.study is None else self.study.objective
         if named not in (None, MEAN_GAP.name):
             remedy = "Remove numerics.target_error, and raise numerics.averaged_revolutions"

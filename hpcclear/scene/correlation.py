@@ -34,8 +34,7 @@ class Correlation(Table):
     def _check(self) -> None:
         count = len(self.inputs)
         if count < 2 or len(set(self.inputs)) < count:
-            reason = "a list of two or more different inputs is expected here"
-            raise invalid(reason, "Name them", "inputs")
+            raise invalid("two or more different inputs are expected", "Name them", "inputs")
         if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
             reason = f"{count} inputs need {count} rows of {count} numbers"
             raise invalid(reason, "Write a row for each input", "matrix")

@@ -265,8 +265,7 @@ def columns_of(
         body = body[1:]
     cells = [_row(path, number, header, one, width, separator) for number, one in body]
     if not cells:
-        reason = f"contains no points ({found})"
-        raise InputError(what, str(path), reason, "Write a row for each point or value")
+        raise InputError(what, str(path), f"contains no points ({found})", "Give each point a row")
     columns = []
     for place, heading in enumerate(header):
         name, unit = parsed_heading(heading)

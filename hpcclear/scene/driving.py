@@ -175,8 +175,7 @@ class PlanarTable(Driving):
         gained = self.angle[-1][1] - self.angle[0][1]
         if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
             reason = f"the last angle is {gained:.6g} rad from the first, where the motion repeats"
-            remedy = "End it where it began, or a full turn further on or back"
-            raise invalid(reason, remedy, "angle")
+            raise invalid(reason, "End it where it began, or a full turn on or back", "angle")
 
 
 class CrankTorque(Table):
@@ -215,8 +214,7 @@ class CrankTorque(Table):
         remedy = "Write torque, or torque_by_speed = [[speed, torque], ...]"
         self.check_one_of(remedy, "torque", "torque_by_speed")
         if self.torque_by_speed is not None and self.no_load_speed is not None:
-            reason = "torque_by_speed says already how the torque falls"
-            raise invalid(reason, "Remove it", "no_load_speed")
+            raise invalid("torque_by_speed says how the torque falls", "Remove it", "no_load_speed")
 
 
 class PlanarTorque(FreeDriving, CrankTorque):

@@ -205,8 +205,7 @@ class Quantity(Converted):
             reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
             raise invalid(reason, "Write the smaller bound first; leave a constant out", key)
         if self.nonzero and lower < 0.0 < upper:
-            reason = "0 is between the bounds"
-            raise invalid(reason, "Keep to one sign: there would be no motion at 0", key)
+            raise invalid("0 is between the bounds", "Keep to one sign: nothing moves at 0", key)
         return lower, upper
 
     def several(self, value: object, key: str, least: int, most: int) -> tuple[float, ...]:

@@ -78,8 +78,7 @@ class FileCurve(Table):
         if self.bore is not None and self.area is not None:
             raise invalid("stands beside bore", "Keep one of them", "area")
         if (given == ["pressure"] or piston) and self.bore is None and self.area is None:
-            reason = "is missing: pressures push on a piston"
-            raise invalid(reason, 'Add bore = "42 mm", or area', "bore")
+            raise invalid("is missing: pressures need it", 'Add bore = "42 mm", or area', "bore")
 
     @property
     def piston(self) -> float | None:
@@ -208,8 +207,9 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
     span = angles[-1] - angles[0]
     if span > 2 * TURN * (1 + 1e-6):
         reason = f"goes over {math.degrees(span):.6g} deg, more than two turns"
-        remedy = "Give one turn, or the two of a four-stroke engine; average cycles first"
-        raise InputError(*where, reason, remedy)
+        raise InputError(
+            *where, reason, "Give one turn, or two of a four-stroke engine; average cycles first"
+        )
     turns = 1 if span <= TURN * (1 + 1e-6) else 2
     step = float(np.median(np.diff(angles)))
     gaps = np.append(np.diff(angles), max(turns * TURN - span, 0.0))
@@ -241,8 +241,7 @@ def with_values(content: Tables, folder: Path) -> tuple[Tables, list[Reading]]:
     for key, row in files_named(content).items():
         file = row["file"]
         if not isinstance(file, str) or not file:
-            reason = "the name of a table is expected here"
-            raise InputError(f"{key}.file", file, reason, "Write it in quotes")
+            raise InputError(f"{key}.file", file, "is no name of a table", "Write it in quotes")
         made: object
         if key.startswith("study.random."):
             made, shown = _with_values(row, file, key, folder)
@@ -259,8 +258,7 @@ def _with_values(row: Tables, file: str, key: str, folder: Path) -> tuple[Tables
     if "values" in row:
         raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
     if column is not None and not isinstance(column, str):
-        reason = "the name of a column is expected here"
-        raise InputError(f"{key}.column", column, reason, "Write it in quotes")
+        raise InputError(f"{key}.column", column, "is no name of a column", "Write it in quotes")
     path = folder / file
     sheet = read(path, f"{key}.file")
     of_numbers = sheet.of_numbers or sheet.columns

@@ -50,8 +50,7 @@ def with_shares(content: Tables) -> Tables:
                 continue
             middle = row["mean"] if "mean" in row else _number(content, path)
             if middle is None:
-                reason = f"there is no number at {path}"
-                raise invalid(reason, "Give that entry first", where, share)
+                raise invalid(f"no number stands at {path}", "Give that entry first", where, share)
             with at(where, share):
                 about = Quantity(unit).number(middle)
                 value = abs(about) * Quantity("").number(share)

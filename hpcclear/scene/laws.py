@@ -61,9 +61,8 @@ def on_geometry(law: ContactLaw, name: str, rows: Rows | None = None) -> Contact
         known = (SPHERE, *found)
         raise invalid("is not one of the known values", nearest(name, known), "geometry", name)
     if law.factor is None:
-        reason = f"the law {law.name!r} has an elastic force of its own"
         remedy = 'Remove geometry, or use a law with damping only, such as "hunt-crossley"'
-        raise invalid(reason, remedy, "geometry", name)
+        raise invalid(f"{law.name!r} has an elastic force of its own", remedy, "geometry", name)
     shape = found[name]
     if (shape.of_rows is None) != (rows is None):
         raise invalid(
@@ -175,8 +174,7 @@ class LawTable(Table):
         entry = cls.formula
         text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
-            reason = "the law 'expression' needs a formula"
-            raise invalid(reason, f'Add {entry} = "..."', entry, text)
+            raise invalid("'expression' needs a formula", f'Add {entry} = "..."', entry, text)
         if not (isinstance(units, Mapping) and {*map(type, units.values())} <= {str}):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with at(entry):
@@ -194,9 +192,8 @@ class LawTable(Table):
                 continue
             if law is not None and law.name == "none" and key in others:
                 off = f'{cls.kind} = "none" (--set effects.{cls.kind}=none)'
-                remedy = f'Write {off} to switch it off, or set law = "coulomb"'
                 reason = 'the law "none" has no parameters, and one says that friction is meant'
-                raise invalid(reason, remedy, "law", "none")
+                raise invalid(reason, f'Write {off}, or set law = "coulomb"', "law", "none")
             if law is not None and key in law.elsewhere:
                 reason, remedy = law.elsewhere[key]
                 raise invalid(reason, remedy, key)
@@ -297,6 +294,5 @@ def _value(parameter: Parameter, value: object) -> float | tuple[float, ...]:
         if parameter.count == 1:
             return quantity.convert(value)
         if not isinstance(value, list | tuple) or len(value) != parameter.count:
-            reason = "a list of the right length is expected here"
-            raise invalid(reason, "Write it as [first, second]")
+            raise invalid("a list of two numbers is expected here", "Write it as [first, second]")
         return tuple(map(quantity.convert, value))

@@ -51,8 +51,7 @@ def resolved_paths(data: Mapping[str, object]) -> tuple[str, ...]:
         return SHORT_NAMES[name]
     paths = texts_in(given)
     if not paths:
-        reason = "a dotted path, or a list of them, is expected here"
-        raise invalid(reason, "Write it in quotes", key)
+        raise invalid("a dotted path or a list of them is expected here", "Write it in quotes", key)
     for path in paths:
         check_known(path, quantities(), "is not a physical number of a scene", key)
     if len(set(paths)) < len(paths):

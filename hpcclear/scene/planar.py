@@ -44,8 +44,7 @@ class BarBending(Table):
 def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
     """An error for validators unless a body that bends is a bar that pins alone hold, at both its ends."""
     if body.length is None:
-        reason = "only a bar can bend, and this body has no length"
-        raise invalid(reason, "Give its length, or leave bending out")
+        raise invalid("a body without length cannot bend", "Give its length, or leave bending out")
     if body.points:
         further = f"the bar has a further point, {body.points[0].name}"
         reason = f"{further}, but bending is modelled for its two ends only"
@@ -142,16 +141,14 @@ class PlanarBody(Table):
                     raise invalid(reason, f"Give its length, or write {instead}", key)
             return
         if self.inertia_ratio is not None and self.inertia:
-            reason = "is given beside the inertia itself"
-            raise invalid(reason, "Remove one of the two", "inertia_ratio")
+            raise invalid("stands beside the inertia", "Remove one of the two", "inertia_ratio")
         if (self.center.x, self.center.y) != (0.0, 0.0):
             reason = "a bar's mass centre is given by mass_center"
             remedy = "Write mass_center, or leave length out and give points"
             raise invalid(reason, remedy, "center", [self.center.x, self.center.y])
         for point in self.points:
             if point.name in ("a", "b"):
-                reason = "is a point that every bar has"
-                raise invalid(reason, "Give it another name", f"points.{point.name}")
+                raise invalid("is a point of every bar", "Rename it", f"points.{point.name}")
 
 
 class Ground(Table):

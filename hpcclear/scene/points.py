@@ -44,8 +44,7 @@ class Points:
     def __post_init__(self) -> None:
         values, count = np.array(self.values, dtype=np.float64), len(self.names)
         if values.ndim != 2 or values.shape[1] != count or len(self.paths) != count:
-            reason = "one column per name is needed"
-            raise InputError("points", values.shape, reason, "Give an (n, d) array")
+            raise InputError("points", values.shape, "one column per name is needed", "Give (n, d)")
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
 
@@ -243,8 +242,7 @@ def read_points(path: str | Path, scene: Scene) -> Points:
     names, paths = tuple(c.name for c in columns), tuple(paths for _, paths in driven if paths)
     twice = [path for path, count in Counter(itertools.chain(*paths)).items() if count > 1]
     if twice:
-        reason = f"two columns drive {twice[0]}"
-        raise InputError(key, ", ".join(names), reason, "Remove one of them")
+        raise InputError(key, ", ".join(names), f"two columns drive {twice[0]}", "Remove one")
     values = np.column_stack(list(map(_read, itertools.repeat(sheet), columns, paths)))
     named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
     points = Points(names, values, paths, named if labels else ())

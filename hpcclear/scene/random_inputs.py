@@ -169,8 +169,7 @@ def _check(law: quantiles.Cut, name: str, parameters: Mapping[str, float]) -> No
             found = np.asarray(law.whole.ppf(_TESTED), float)
     except Exception as error:
         reason = f"ppf of {name} raised {type(error).__name__}: {error}"
-        remedy = "Mend it: it takes arrays of probabilities"
-        raise invalid(reason, remedy, "distribution") from error
+        raise invalid(reason, "Let it take arrays of probabilities", "distribution") from error
     fine = found.shape == _TESTED.shape and np.isfinite(found).all() and (np.diff(found) >= 0).all()
     if not fine or not found[0] < found[-1]:
         reason = f"{name} with {given} has no finite, increasing quantiles"
@@ -271,17 +270,14 @@ class RandomInput(NamedInput):
             if key in needed and value is None:
                 raise invalid(f"the distribution {self.distribution!r} needs it", "Add it", key)
             if key not in needed | further | {"relative"} and value not in (None, False):
-                reason = f"does not belong to this {self.distribution!r} distribution"
-                raise invalid(reason, "Remove it", key)
+                raise invalid(f"does not belong to {self.distribution!r}", "Remove it", key)
         self._check_cut()
 
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
-            reason = "a lognormal has a mean above 0"
-            raise invalid(reason, "Correct it, or use another distribution", "mean")
+            raise invalid("a lognormal has a mean above 0", "Correct mean or distribution", "mean")
         if self.distribution == "fit" and any(not p.endswith(".clearance") for p in self.paths):
-            reason = "a fit gives clearances of joints only"
-            raise invalid(reason, "Correct its path", "distribution")
+            raise invalid("a fit gives clearances of joints", "Correct its path", "distribution")
         if self.worn:
             return
         law = self.law  # of a plug-in found now, while it is known where its file is
@@ -290,8 +286,7 @@ class RandomInput(NamedInput):
             cut = isinstance(law, quantiles.Normal) and law.reach < _LEAST_SHARE * law.deviation
             if cut or not low < high:
                 reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
-                remedy = "Widen it"
-                raise invalid(reason, remedy, "range" if self.range is not None else "half_width")
+                raise invalid(reason, "Widen it", "range" if self.range else "half_width")
         if isinstance(law, quantiles.Cut) and self.range and self.distribution != "beta":
             below, above = law.chances
             if above - below < _LEAST_SHARE:

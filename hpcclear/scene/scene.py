@@ -142,8 +142,7 @@ class Scene(ConsistentTables):
         altered = {path: unboxed(one) for path, one in {**(changes or {}), **more}.items()}
         for path, value in altered.items():
             if not dotted(path):
-                reason = "is not a dotted path"
-                raise InputError("path", path, reason, "Write, say, mechanism.rod.mass")
+                raise InputError("path", path, "is no dotted path", "Write mechanism.rod.mass, say")
             content = entry_replaced(content, path, value)
         result = scene_of(Scene, content, self)
         known = {one.entry for one in result._readings}

@@ -265,8 +265,7 @@ def read_series(path: Path) -> Sheet:
     sheet = read(path, "measured table")
     if len(sheet.axes) + len(sheet.signals) < 2 or len(sheet.lines) < 3:
         reason = "has no series: an axis, a quantity and three rows are needed"
-        remedy = "Give time or angle first, then quantities"
-        raise InputError("measured table", str(path), reason, remedy)
+        raise InputError("measured table", str(path), reason, "Give time or angle, then quantities")
     return sheet
 
 

@@ -232,9 +232,8 @@ class Verification(Table):
 
     def _check(self) -> None:
         if self.method == "qmc" and self.samples is not None:
-            reason = "the number of points of a Sobol sequence follows from the accuracy"
             remedy = 'Set study.accuracy or most_samples, or write method = "monte-carlo"'
-            raise invalid(reason, remedy, "samples")
+            raise invalid("a Sobol sequence's size follows from the accuracy", remedy, "samples")
 
     @property
     def draws(self) -> int | None:

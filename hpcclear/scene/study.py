@@ -71,8 +71,7 @@ class Study(StudyTables):
             if others or not alike:
                 other = (*others, row.name)[0]
                 reason = f"drives what the study variable {other} drives"
-                remedy = f"Name the random input {other}, without a path"
-                raise invalid(reason, remedy, f"random.{row.name}")
+                raise invalid(reason, f"Name it {other}, without a path", f"random.{row.name}")
             for path in row.paths:
                 claim(owner, path, row.name, f"random.{row.name}")
 
@@ -152,8 +151,7 @@ class Study(StudyTables):
                     priced = tuple(one for one in self.variables if one.name in own and one.priced)
                     if not priced:
                         remedy = 'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one'
-                        reason = "no design variable of this case has a cost"
-                        raise invalid(reason, remedy, f"{key}.statistic")
+                        raise invalid("no design variable has a cost", remedy, f"{key}.statistic")
                     goal.priced_by(priced)
 
     @staticmethod
@@ -174,8 +172,7 @@ class Study(StudyTables):
             raise invalid(reason, remedy, f"variables.{of_loads[1]}.over")
         for row in self.random:
             if row.name in of_loads:
-                reason = "is a load case"
-                raise invalid(reason, "Remove it, or name another entry", f"random.{row.name}")
+                raise invalid("is a load case", "Remove it, or name another", f"random.{row.name}")
         self._check_lists(of_loads)
         self._check_groups()
 
@@ -189,16 +186,14 @@ class Study(StudyTables):
         for key, given in lists:
             names = tuple(given)
             if not names and "optimisation" not in key:
-                remedy = "Name one, or remove the empty list"
-                raise invalid("a model needs at least one input", remedy, key)
+                raise invalid("a model needs an input", "Name one, or remove the empty list", key)
             for name in names:
                 check_known(name, self.names, _NO_VARIABLE, key)
             if len(set(names)) < len(names):
                 raise invalid("a variable is named twice", "Remove one", key=key)
             loads = [n for n in names if n in of_loads]
             if loads:
-                reason = f"{loads[0]!r} is a load case, which no design chooses"
-                raise invalid(reason, "Leave it out", key)
+                raise invalid(f"{loads[0]!r} is a load case, chosen by no design", "Remove it", key)
             odd = [n for n in names if not self.variable(n).paths and "optimisation" not in key]
             if odd:
                 raise invalid(
@@ -212,8 +207,7 @@ class Study(StudyTables):
             parameter = self.sensitivity.parameter
             if parameter is None:
                 reason = "not one variable drives clearances, so the fixed parameter is not known"
-                remedy = f"Name one of {', '.join(self.names)}"
-                raise invalid(reason, remedy, "sensitivity.parameter")
+                raise invalid(reason, f"Use {', '.join(self.names)}", "sensitivity.parameter")
             check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):
                 reason = "the parameter is fixed, so it cannot be an input of a surface"

@@ -93,15 +93,13 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
     if waves is None:
         return
     if film is not None:
-        reason = "an oil film needs round surfaces"
-        raise invalid(reason, "Remove out_of_round, or film", "out_of_round", None)
+        raise invalid("an oil film needs round surfaces", "Remove it or film", "out_of_round", None)
     for name in ("bearing", "journal"):
         own = getattr(waves, name)
         if own is not None and own.deepest() >= clearance:
             high, given = shown(own.deepest(), "m"), shown(clearance, "m")
             reason = f"waves are {high} high, but the clearance is {given}: the journal may not fit"
-            remedy = "Make them smaller than the clearance"
-            raise invalid(reason, remedy, f"out_of_round.{name}", own.deepest())
+            raise invalid(reason, "Make them smaller", f"out_of_round.{name}", own.deepest())
 
 
 class WornSurface(Table):
@@ -146,8 +144,7 @@ class Wear(Table):
 
     def _check(self) -> None:
         if self.bearing is None and self.journal is None:
-            reason = "neither bearing nor journal wears"
-            raise invalid(reason, "Give one of them a coefficient", "bearing")
+            raise invalid("neither bearing nor journal wears", "Give one a coefficient", "bearing")
 
 
 class WearLimits(Table):
@@ -201,5 +198,4 @@ class Lives(Table):
 
     def _check(self) -> None:
         if self.most_copies < self.copies:
-            reason = "copies is larger than most_copies"
-            raise invalid(reason, "Raise most_copies, or lower copies", "most_copies")
+            raise invalid("is below copies", "Raise it, or lower copies", "most_copies")

@@ -244,8 +244,7 @@ class Off:
             if random := [name for name in case.random if name in left["random"]]:
                 cases[case.name] = {**content["cases"][case.name], "random": random}
         if not left["variables"] or (study.cases and not cases):
-            reason = "no variable would be left"
-            raise InputError("study", None, reason, "Keep the effect that it varies")
+            raise InputError("study", None, "no variable is left", "Keep the effect that it varies")
         kept = {key: value for key, value in content.items() if key != "correlation"} | left
         for stage in ("sensitivity", "surrogate"):
             kept[stage] = _named(content[stage], left["variables"])

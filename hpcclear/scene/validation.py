@@ -136,8 +136,7 @@ def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
     for row in study.worn:
         key = f"study.random.{row.name}"
         if scene.wear is None:
-            reason = "the scene has no [wear] table"
-            raise invalid(reason, "Add [wear], as in jobs/worn_study.toml", key, "wear")
+            raise invalid("[wear] is missing", "Add [wear] as in jobs/worn_study.toml", key, "wear")
         for path in row.paths:
             if path not in clearances:
                 remedy = nearest(path, clearances) if clearances else "Give joints a table wear"
@@ -187,8 +186,9 @@ def _check_corner(
     except ValidationError as error:
         said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
         reason = getattr(said, "reason", "it is not valid")
-        remedy = "Narrow it"
-        raise invalid(f"reaches {words}, which makes no mechanism: {reason}", remedy, key) from None
+        raise invalid(
+            f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key
+        ) from None
 
 
 def _check_depth(content: Tables) -> None:
@@ -198,8 +198,7 @@ def _check_depth(content: Tables) -> None:
         level = [one for row in below for one in row if isinstance(one, (Mapping, list, tuple))]
         if not level:
             return
-    remedy = f"Nest at most {DEEPEST} levels of tables and arrays"
-    raise InputError("scene", "...", "is nested too deeply", remedy)
+    raise InputError("scene", "...", "is nested too deeply", f"Nest {DEEPEST} levels at most")
 
 
 def _translated(error: ErrorDetails, content: Tables, more: int) -> InputError:

@@ -83,8 +83,7 @@ class StudyVariable(NamedInput):
                 _, entry = choices.input_entry(path)
                 if (entry == "fit") != ("fits" in data):
                     reason = f"{path} is {'a fit' if entry == 'fit' else 'no fit'}"
-                    remedy = "Give fits = [...] for fits, else a range or values"
-                    raise invalid(reason, remedy, "path")
+                    raise invalid(reason, "Use fits = [...] for fits, else range or values", "path")
             elif f"{path.removesuffix('.fit')}.clearance" not in quantities():
                 raise invalid(f"{path} is no fit of a joint", 'Write "joints.NAME.fit"', "path")
         kept = {key: value for key, value in data.items() if key != "path"}
@@ -302,5 +301,4 @@ def _of_input(row: Content) -> Quantity:
 
 def _same_length(cost: Sequence[object], options: Sequence[object]) -> None:
     if len(cost) != len(options):
-        reason = f"{len(cost)} costs for {len(options)} options"
-        raise invalid(reason, "Give each option a cost", "cost")
+        raise invalid(f"{len(cost)} costs for {len(options)} options", "Give each a cost", "cost")

@@ -66,8 +66,7 @@ class Guide(AlongLine):
             size, radius = getattr(self, entry), self.corner_radius
             if radius is not None and 2.0 * radius >= size:
                 reason = f"both corners of a side must fit into its {entry} ({shown(size, 'm')})"
-                remedy = f"Write less than half of the {entry}, such as 1 mm"
-                raise invalid(reason, remedy, "corner_radius")
+                raise invalid(reason, "Write less than half of it, say 1 mm", "corner_radius")
 
     def contacts(self) -> dict[str, tuple[str, str]]:
         """The centres of its corners, and the line."""

@@ -174,8 +174,7 @@ def _with_blocks(points: Sequence[DrawnPoint], key: str) -> list[DrawnPoint]:
     for one in points:
         if one.slide is not None:
             if GROUND in one.bodies and one.guide == GROUND:
-                reason = "a point of the ground slides"
-                raise InputError(key, one.name, reason, "Name its moving bodies")
+                raise InputError(key, one.name, "a ground point slides", "Name its moving bodies")
             alone = [b for b in one.bodies if b != GROUND and uses[b] == 1]
             block = one.block or (alone[-1] if alone else f"slider_{one.name}")
             while not one.block and not alone and block in uses:
@@ -221,8 +220,7 @@ def _frame(name: str, own: Sequence[DrawnPoint], key: str) -> _Frame:
         return _Frame(own[0].x, own[0].y, 0.0)
     first, second = own[:2]
     if math.hypot(second.x - first.x, second.y - first.y) == 0.0:
-        reason = f"{first.name} and {second.name} are at one place"
-        raise InputError(key, name, reason, "Mend one of them")
+        raise InputError(key, name, f"{first.name} and {second.name} are at one place", "Mend one")
     return _Frame(first.x, first.y, math.atan2(second.y - first.y, second.x - first.x))
 
 
