@@ -267,7 +267,7 @@ def test_a_random_clearance_by_the_fit_of_its_joint():
         ({"fit": "20 H7/f7", "pin": {"distribution": "uniform", "cp": 1.33}}, "belongs to a normal"),
         ({"fit": "20 H7/f7", "pin": {"range": ["20 mm", "19 mm"]}}, "are crossed"),
         ({"fit": "20 H7/f7", "pin": {"capability": 1}}, "is not a known key"),
-        ({"fit": "20 H7/f7", "path": "mechanism.rod.mass"}, "clearances of joints only"),
+        ({"fit": "20 H7/f7", "path": "mechanism.rod.mass"}, "gives clearances of joints"),
     ],
 )  # fmt: skip
 def test_random_fits_that_are_none(row, words):

@@ -97,7 +97,7 @@ def test_what_the_kernel_reads_is_what_numpy_is_given_and_derivatives_belong_tog
 def test_tables_that_do_not_repeat_are_refused():
     table = [[0.0, 0.0], [0.1, 0.5], [0.2, 0.2], [0.3, 1.0]]
     motor = {"kind": "table", "body": "crank", "angle": table}
-    with pytest.raises(InputError, match="the motion repeats there"):
+    with pytest.raises(InputError, match="where the motion repeats"):
         ROCKER.with_({"mechanism.drives": {"motor": motor}})
     with pytest.raises(InputError, match="must rise from row to row"):
         ROCKER.with_({"mechanism.drives": {"motor": {**motor, "angle": table[1:] + table[:1]}}})
