@@ -102,12 +102,9 @@ class Lead:
         if queue.idle:
             backoff.wait()
         else:
-            self._accept(queue.work(GLANCE if self._awaited else QUANTUM))
-
-    @property
-    def _awaited(self) -> bool:
-        """Whether others wait for their first samples or share the last."""
-        return bool(self._present) and (time.monotonic() < self._early or self.book.ending)
+            # others wait for their first samples, or share the last
+            awaited = self._present and (time.monotonic() < self._early or self.book.ending)
+            self._accept(queue.work(GLANCE if awaited else QUANTUM))
 
     def _gather(self, until: float | None) -> None:
         """End the stage on every rank; after an error or a stop, do not wait for ever."""

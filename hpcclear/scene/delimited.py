@@ -259,18 +259,18 @@ def columns_of(
         reason = f"the headings stand in the first column ({found})"
         remedy = "Transpose the table, so that they stand in the first row"
         raise InputError(f"{path}, line {line}", ", ".join(header)[:200], reason, remedy)
-    units: list[str | None] = [None] * width
-    if body and _are_units(body[0][1]):
-        units = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]]
-        body = body[1:]
+    units: list[str] = []
+    below = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]] if body else []
+    filled = [cell for cell in below if cell not in NOTHING]
+    if filled and all(map(is_unit, filled)):
+        units, body = below, body[1:]
     cells = [_row(path, number, header, one, width, separator) for number, one in body]
     if not cells:
         raise InputError(what, str(path), f"contains no points ({found})", "Give each point a row")
     columns = []
     for place, heading in enumerate(header):
         name, unit = parsed_heading(heading)
-        if place < len(units) and units[place] is not None:
-            unit = units[place] or unit
+        unit = "".join(units[place : place + 1]) or unit
         column = SheetColumn(name, unit, heading, tuple(row[place] for row in cells))
         if not heading and any(column.cells):
             reason = "a column has no heading"
@@ -323,13 +323,6 @@ def parsed_heading(heading: str) -> tuple[str, str]:
     if attached and attached[2] in ("deg", "bar", "kPa", "MPa", "mm", "rpm", "Nm", "ms"):
         return attached[1], attached[2]
     return heading, ""
-
-
-def _are_units(cells: list[str]) -> bool:
-    """Whether a row below the headings has units: no number, and some cell that is a unit, or nothing."""
-    bare = [re.sub(r"[\[\]()]", "", cell).strip() for cell in cells]
-    filled = [cell for cell in bare if cell not in NOTHING]
-    return bool(filled) and all(is_unit(cell) for cell in filled)
 
 
 def _has_commas(path: Path, columns: list[SheetColumn], lines: list[int], separator: str) -> bool:

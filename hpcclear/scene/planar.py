@@ -8,24 +8,11 @@ from pydantic import Field
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
+from hpcclear.scene import fields
 from hpcclear.scene.contacts import KINDS as LOOSE
 from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
-from hpcclear.scene.fields import (
-    NOWHERE,
-    Angle,
-    Count,
-    Length,
-    Mass,
-    NamedPlace,
-    NamedPlaces,
-    NamedRows,
-    Position,
-    Quantity,
-    Table,
-    invalid,
-    nearest,
-)
+from hpcclear.scene.fields import Count, NamedRows, Quantity, Table, invalid, nearest
 from hpcclear.scene.joints import PlanarFixed, PlanarRevolute
 from hpcclear.scene.loads import AnyLoad
 
@@ -88,7 +75,7 @@ class PlanarBody(Table):
     """A body, rigid unless it is a bar that bends."""
 
     name: str
-    mass: Mass
+    mass: fields.Mass
     """Mass, kg."""
     inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Moment of inertia about the mass centre, kg m2; ignored if the body cannot rotate."""
@@ -97,13 +84,13 @@ class PlanarBody(Table):
     mass and length."""
     length: Annotated[float, Quantity("m", above=0)] | None = None
     """Length of a bar, m. A bar has the points a at its origin and b at this distance along its x axis."""
-    mass_center: Length | None = None
+    mass_center: fields.Length | None = None
     """For a bar: distance of its mass centre from a towards b, m; default: the middle."""
-    center: Position = NOWHERE
+    center: fields.Position = fields.NOWHERE
     """Position of the mass centre in the body's own axes, m."""
-    points: NamedPlaces = ()
+    points: fields.NamedPlaces = ()
     """Points at which joints and loads act, in the body's own axes, m."""
-    start_angle: Angle = 0.0
+    start_angle: fields.Angle = 0.0
     """Approximate angle at the start, rad, from which the assembly is computed. For a driven body it is the exact angle
     at the start, unless the drive prescribes the angle (harmonic, table); with `turns` = 2 of its drive, 360 degrees or
     more begins in the second turn."""
@@ -154,7 +141,7 @@ class PlanarBody(Table):
 class Ground(Table):
     """The ground, which does not move."""
 
-    points: NamedPlaces = (NamedPlace(name="o", x=0.0, y=0.0),)
+    points: fields.NamedPlaces = (fields.NamedPlace(name="o", x=0.0, y=0.0),)
     """Named points of the ground, m."""
 
 

@@ -85,7 +85,7 @@ class StudyTables(Table):
 
     @property
     def names(self) -> stages.Names:
-        """stages.Names of the study variables, in file order: the columns of its designs."""
+        """Names of the study variables, in file order: the columns of its designs."""
         return tuple(variable.name for variable in self.variables)
 
     def variable(self, name: str) -> StudyVariable:
@@ -182,7 +182,7 @@ class StudyTables(Table):
         return found
 
     def drivers(self, row: RandomInput) -> tuple[str, ...]:
-        """stages.Names of the variables that drive entries of a random input."""
+        """Names of the variables that drive entries of a random input."""
         return tuple(one.name for one in self._drivers[row.name])
 
     def moves(self, row: RandomInput) -> bool:
