@@ -34,8 +34,7 @@ from hpcclear.scene.planar import turns_of
 def run_identify(
     scene: Scene, output: Path, ranks: Ranks, settings: Settings, options: Options = DEFAULT_OPTIONS
 ) -> Finished:
-    """Identify unknowns on all ranks and write what was found; on root. Random inputs of the scene's study are nuisance
-    inputs.
+    """Identify unknowns on all ranks and write what was found; on root. Random inputs of the scene's study are nuisance inputs.
 
     Raises InputError, StorageError, Stopped, RankFailed.
     """

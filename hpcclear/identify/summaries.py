@@ -43,9 +43,8 @@ PREDICTABLE = 0.1
 class InputRegression:
     """An input, between 0 and 1, as a function of features.
 
-    `centre`, `scale` (p,): mean of the features, and the reciprocals of their units, 0 where a feature is not used; `rows`
-    (n, p): features of the members in these units; `weights` (n,); `left_out` (n,): of each member, by the regression without
-    it.
+    `centre`, `scale` (p,): mean of the features, and the reciprocals of their units, 0 where a feature is not used; `rows` (n,
+    p): features of the members in these units; `weights` (n,); `left_out` (n,): of each member, by the regression without it.
     """
 
     centre: Array

@@ -95,15 +95,13 @@ class Allotment(NamedTuple):
 def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     """Size of the next block for one rank, of `remaining` samples: enough to stay busy, less and less towards the end.
 
-    Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank
-    does in about half a second (longer on many ranks, so that root is not swamped by requests),
-    never more than half its fair share of what is left, never less than fills its lanes: samples in
-    lanes of a batch take the time of the longest one, so an empty lane saves nothing.
-    Stock for the time a request takes is kept while there is enough to do; at the end it would only
-    sit behind one rank while another is idle, and a lane waits for its next sample instead.
+    Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank does in about half a second
+    (longer on many ranks, so that root is not swamped by requests), never more than half its fair share of what is left, never
+    less than fills its lanes: samples in lanes of a batch take the time of the longest one, so an empty lane saves nothing.
+    Stock for the time a request takes is kept while there is enough to do; at the end it would only sit behind one rank while
+    another is idle, and a lane waits for its next sample instead.
 
-    Source of guided self-scheduling: Polychronopoulos and Kuck, IEEE Trans. Computers C-36 (1987),
-    doi:10.1109/TC.1987.5009495.
+    Source of guided self-scheduling: Polychronopoulos and Kuck, IEEE Trans. Computers C-36 (1987), doi:10.1109/TC.1987.5009495.
     """
     horizon = max(0.5, 2e-4 * ranks)  # s; 10 000 ranks send root some 5000 requests a second
     lead = need.rate * 0.2 * horizon  # samples finished while a request is under way

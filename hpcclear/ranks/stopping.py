@@ -36,9 +36,7 @@ class Stopped(Exception):
 
 
 class RankFailed(Exception):
-    """Another rank cannot go on: bad input or a program error; the text is its report, `code` the exit code that follows of
-    it.
-    """
+    """Another rank cannot go on: bad input or a program error; the text is its report, `code` the exit code that follows of it."""
 
     def __init__(self, report: str, code: int = Exit.FAILED) -> None:
         super().__init__(report)
@@ -53,14 +51,13 @@ ANEW = "Nothing is kept: the same command starts anew"
 class StopSwitch:
     """Collects the signals and the time limit of one process; loops poll `is_set`.
 
-    A thread of its own listens, since Python runs signal handlers only between two bytecodes of the
-    main thread, which a long fit in compiled code may not reach in time. Once it has to stop, the
-    process has `GRACE` seconds before `last_resort` ends it: files are written whole and renamed,
-    so that nothing breaks. A second SIGINT ends it at once.
+    A thread of its own listens, since Python runs signal handlers only between two bytecodes of the main thread, which a long
+    fit in compiled code may not reach in time. Once it has to stop, the process has `GRACE` seconds before `last_resort` ends
+    it: files are written whole and renamed, so that nothing breaks. A second SIGINT ends it at once.
 
     Use as a context manager in the main thread, as early as possible: until then a signal kills. Afterwards the old handlers
-    come back, or, if nothing but the end of the process follows (`ends_process`), signals are ignored. `outlook`: what the
-    same command does after an early stop, `RESUMES`, or `ANEW` where nothing is saved.
+    come back, or, if nothing but the end of the process follows (`ends_process`), signals are ignored. `outlook`: what the same
+    command does after an early stop, `RESUMES`, or `ANEW` where nothing is saved.
     """
 
     def __init__(self, ends_process: bool = False) -> None:

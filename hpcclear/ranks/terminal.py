@@ -75,8 +75,7 @@ def terminal() -> TextIO | None:
 def launching_terminal() -> TextIO | None:
     """The terminal on which a local mpiexec shows what its ranks write; None if there is none.
 
-    Ranks write to a pipe even when a person watches, so look up the standard error of mpiexec
-    (Linux only).
+    Ranks write to a pipe even when a person watches, so look up the standard error of mpiexec (Linux only).
     """
     if sys.platform != "linux" or not is_launched():
         return None

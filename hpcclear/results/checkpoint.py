@@ -137,8 +137,7 @@ class Checkpoint:
     def flush(self) -> None:
         """Write what has gathered, now; nothing happens when nothing has.
 
-        Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory,
-        and a later call tries again.
+        Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory, and a later call tries again.
         """
         if not self._buffer:
             self._written = self._clock()

@@ -40,9 +40,8 @@ class Goal(Table):
     """A statistic of f over the random inputs of a case, or a formula of its design variables."""
 
     statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
-    """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all
-    machines stays below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study
-    variables."""
+    """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all machines stays
+    below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study variables."""
     of: str | None = None
     """Response that the statistic refers to, such as "peak-contact-force"; default: the objective of the study."""
     formula: str | None = None

@@ -251,8 +251,7 @@ def _entry(scene: SceneTables, key: str, entries: Mapping[str, object]) -> str:
 
 
 def differences(first: SceneTables, second: SceneTables) -> list[str]:
-    """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
-    equal."""
+    """Dotted keys in which two scenes differ, each with both values; empty when their hashes are equal."""
     ours, theirs = (dict(flatten(inputs_of(one.resolved()))) for one in (first, second))
     for entries in (ours, theirs):
         for key in entries:

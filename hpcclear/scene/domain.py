@@ -102,8 +102,7 @@ def _bounds(
 
 
 def _span(scene: SceneTables, path: str, names: tuple[str, ...]) -> Range:
-    """Range of the design values at a path: its variable's, if that is among `names`, else the
-    scene's."""
+    """Range of the design values at a path: its variable's, if that is among `names`, else the scene's."""
     for name in names:
         variable = scene.required_study.variable(name)
         if path in variable.paths and variable.range is not None:

@@ -54,11 +54,9 @@ class FileCurve(Table):
     ambient: Annotated[float, Quantity("Pa", least=0)] | None = None
     """Pressure on the other side of the piston, Pa. Required with pressures; 0 if the file contains gauge pressures."""
     pushes: Literal["+x", "-x"] | None = None
-    """Direction in which the pressure pushes a slider; default "-x", away from a cylinder head beyond the outer dead
-    centre."""
+    """Direction in which the pressure pushes a slider; default "-x", away from a cylinder head beyond the outer dead centre."""
     zero: Annotated[float, Quantity("rad")] = 0.0
-    """Crank angle of the scene at which the angle of the file is 0, rad: that of the dead centre from which the file
-    counts."""
+    """Crank angle of the scene at which the angle of the file is 0, rad: that of the dead centre from which the file counts."""
     clockwise: bool = False
     """Whether the angles of the file count clockwise."""
 

@@ -52,8 +52,7 @@ class Numerics(Table):
     """Joints with clearance, or single contacts such as "guide.front_left", whose gaps or contact forces the objective
     combines; default: all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
-    """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status
-    STEP_CAP."""
+    """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status STEP_CAP."""
     energy: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also records its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False

@@ -1,5 +1,4 @@
-"""Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or
-replace one."""
+"""Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or replace one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -180,8 +179,7 @@ def described(paths: Sequence[str]) -> str:
 def replace(content: Tables, path: str, value: object) -> Content:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
-    What is not a table on the way to it is replaced by one; the model then says what is wrong with
-    that.
+    What is not a table on the way to it is replaced by one; the model then says what is wrong with that.
     """
     head, _, rest = path.partition(".")
     copy = dict(content)

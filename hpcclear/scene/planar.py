@@ -66,8 +66,7 @@ Numbers = TypeVar("Numbers", float, Array, float | Array)
 
 
 def slender_inertia(mass: Numbers, length: Numbers) -> Numbers:
-    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass
-    would have."""
+    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass would have."""
     return mass * length**2 / 12
 
 

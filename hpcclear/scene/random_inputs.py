@@ -193,9 +193,8 @@ class RandomInput(NamedInput):
     }  # fmt: skip
 
     distribution: str
-    """The distribution. "samples": measured values. "wear": clearances after the service lives of `[wear]`. Also any
-    continuous distribution of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name"
-    of a file."""
+    """The distribution. "samples": measured values. "wear": clearances after the service lives of `[wear]`. Also any continuous
+    distribution of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a file."""
     range: Bounds = None
     """Bounds of a "uniform" or "beta" distribution, truncation of the others, SI."""
     mean: Number = None

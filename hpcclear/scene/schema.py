@@ -102,8 +102,7 @@ def _with_files(schema: JsonSchemaValue) -> JsonSchemaValue:
 def scene_schema() -> JsonSchemaValue:
     """JSON schema (draft 2020-12) of the scene file.
 
-    It says which keys and kinds of values there are; what makes a mechanism is checked by
-    `load_scene` alone.
+    It says which keys and kinds of values there are; what makes a mechanism is checked by `load_scene` alone.
     """
     schema = _with_files(Scene.model_json_schema())
     definitions = schema["$defs"]

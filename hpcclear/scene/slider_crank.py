@@ -30,8 +30,7 @@ class Link(Table):
     inertia: Inertia
     """Moment of inertia about its mass centre, kg m2."""
     mass_center: Length
-    """Distance of the mass centre from its first joint along the link, m; may lie beyond either
-    pin."""
+    """Distance of the mass centre from its first joint along the link, m; may lie beyond either pin."""
     bending: BarBending | None = None
     """Bending of the rod. Without it the rod is rigid."""
 

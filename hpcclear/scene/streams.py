@@ -18,8 +18,7 @@ def _seed(seed: int, *labels: str) -> np.random.SeedSequence:
 
 
 def uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array:
-    """Numbers `first` to `first + count` of one stream, strictly between 0 and 1, shape
-    (count,)."""
+    """Numbers `first` to `first + count` of one stream, strictly between 0 and 1, shape (count,)."""
     # Philox is counter-based: it can start anywhere. One step of its counter gives four numbers.
     bits = np.random.Philox(_seed(seed, purpose, name))
     bits.advance(first // 4)
@@ -34,8 +33,7 @@ SOBOL_BITS = 30
 
 
 def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
-    """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1,
-    shape (count, dimensions)."""
+    """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1, shape (count, dimensions)."""
     from scipy.stats import qmc  # most of a second to import; a single response needs none of it
 
     if dimensions == 0:

@@ -229,8 +229,7 @@ class Study(StudyTables):
 
 
 def _with_paths(row: object, variable: object) -> object:
-    """A random input with the path or paths of the variable of the same name, unless it has its
-    own."""
+    """A random input with the path or paths of the variable of the same name, unless it has its own."""
     if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
         return row
     if "path" in row or "paths" in row:

@@ -58,11 +58,10 @@ class StudyTables(Table):
     objective: Annotated[str, ObjectiveName(OBJECTIVES)] = "mean-gap"
     """Objective f to minimise: the mean gap (eq. 13), another response, or an objective of your own."""
     accuracy: stages.MomentAccuracy | None = None
-    """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: one
-    number for both, or a table. Each design is simulated until it meets them. The half-widths include the error of the
-    integration tolerance, measured by pairs of samples at a tighter tolerance. Default: `mean = 0.002`, `deviation =
-    0.005` for the sampling error alone; the printed intervals then still include the error of the tolerance, from a few
-    pairs."""
+    """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: one number
+    for both, or a table. Each design is simulated until it meets them. The half-widths include the error of the integration
+    tolerance, measured by pairs of samples at a tighter tolerance. Default: `mean = 0.002`, `deviation = 0.005` for the
+    sampling error alone; the printed intervals then still include the error of the tolerance, from a few pairs."""
     variables: Annotated[tuple[StudyVariable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None

@@ -270,8 +270,7 @@ class SceneTables(Table):
         return hashlib.sha256(content.encode()).hexdigest()
 
     def resolved(self) -> Content:
-        """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
-        in."""
+        """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled in."""
         content: Content = plain(self)
         # A name's own paths are left out, so that C follows when a joint is made ideal.
         open_paths = [f"{self.joint_key(name)}.clearance" for name in self.clearance_joints()]

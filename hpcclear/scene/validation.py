@@ -148,8 +148,7 @@ def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
 
 
 def _check_corners(scene: SceneTables, study: Study) -> None:
-    """Each bound of each variable, widened by what is random about it, must still make a
-    mechanism."""
+    """Each bound of each variable, widened by what is random about it, must still make a mechanism."""
     names = (*PHYSICAL, "numerics", "plugins")
     content = {name: plain(table) for name in names if (table := getattr(scene, name))}
     reach = {row.name: study.reach(row) for row in study.random if not row.absolute}
@@ -259,8 +258,7 @@ def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ..
 
 
 def _follow(location: tuple[int | str, ...], content: object) -> tuple[tuple[str, ...], Any]:
-    """The keys along a location, and what stands there in the raw content (None if nothing
-    does)."""
+    """The keys along a location, and what stands there in the raw content (None if nothing does)."""
     names: list[str] = []
     for step in location:
         if isinstance(content, Mapping):

@@ -1,7 +1,6 @@
 """Files of other programs that hold a linkage: one file here for each format.
 
-To add one: a module with `drawing_of(file)`, which returns a `Drawing` or refuses with the cause, and its line
-in `FORMATS`.
+To add one: a module with `drawing_of(file)`, which returns a `Drawing` or refuses with the cause, and its line in `FORMATS`.
 """
 
 from pathlib import Path
