@@ -191,7 +191,8 @@ class _Book:
         if len(filled) != 1:
             listed = f": {', '.join(filled)}"[:1000] if filled else ""
             remedy = f'Name one as in "{self.path.name}#{filled[0]}"' if filled else "Fill one"
-            raise InputError(self.what, place, f"has {len(filled)} filled sheets{listed}", remedy)
+            reason = f"has {len(filled)} sheets that hold something{listed}"
+            raise InputError(self.what, place, reason, remedy)
         return self.sheets[filled[0]]
 
     def _is_filled(self, part: str) -> bool:
