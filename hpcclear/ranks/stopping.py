@@ -36,7 +36,7 @@ class Stopped(Exception):
 
 
 class RankFailed(Exception):
-    """Another rank cannot go on: bad input or a program error; the text is its report, `code` the exit code that follows of it."""
+    """Another rank cannot go on: bad input or a fault; the text is its report, `code` the exit code that follows of it."""
 
     def __init__(self, report: str, code: int = Exit.FAILED) -> None:
         super().__init__(report)
