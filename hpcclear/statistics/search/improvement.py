@@ -47,6 +47,9 @@ DRAWS = 64
 """Draws of what is believed: of three or more objectives for an expected improvement without a closed form, and of all designs
 together."""
 
+UNSEEN = 4.0
+"""Standard deviations that a design may be below its mean in draws: where that is not the least mean it is not drawn."""
+
 ROUND_OFF = 1e-9
 """Smallest variance that is drawn, over the largest."""
 
@@ -83,6 +86,9 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     and what the design that is believed to be the best is expected to lose to the best of all; 0 where none is new."""
     points = np.vstack([beliefs.known.designs[beliefs.allowed], _candidates(beliefs)])
     points = points[beliefs.feasible(points) >= LIKELY]
+    mean, variance = beliefs.means(points) @ direction, beliefs.variances(points) @ direction**2
+    may = mean - UNSEEN * np.sqrt(variance) <= mean.min(initial=np.inf)
+    points, mean = points[may], mean[may]
     new = _apart(points, beliefs)
     if not new.any():
         return points[:0], 0.0
@@ -90,7 +96,6 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     for model, weight in zip(beliefs.models, direction, strict=True):
         if model is not None and weight:
             square += weight**2 * model.rest.covariance(points)
-    mean = beliefs.means(points) @ direction
     draws = beliefs.rng.standard_normal((DRAWS, len(points)))
     # Known designs have next to no variance, and round-off makes some of it negative: pivots end before these.
     factor, order, rank, _ = dpstrf(
