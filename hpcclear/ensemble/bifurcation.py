@@ -1,6 +1,5 @@
 """`map --bifurcation`: one entry of a scene over a range, and what the motion does once a revolution at each value."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -91,35 +90,27 @@ def run_bifurcation(
     """Simulate a scene at each value of an entry (``PATH=LO:HI:N``) on all ranks, and write what is observed of each
     revolution; on root. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     place = Place.of_file(output, options.fresh)
     points, _ = cells(scene, (axis,))
+    varied, count = points.values[:, 0], observation.revolutions
     key = {**sample_key(scene, points), "command": "bifurcation", "observation": repr(observation)}
-    with Session(place, key, ranks, options) as session:
-        content = session.found("bifurcation")
-        if content is None:
-            session.describe(scene)
-            names = {
-                "study": None,
-                "numerics.target_error": None,
-                "numerics.transient_revolutions": observation.transient,
-                "numerics.averaged_revolutions": observation.revolutions,
-            }
-            variants = [dict.fromkeys(points.paths[0], float(one)) for one in points.values[:, 0]]
-            long = scene.with_(names)
-            what = observation.described(
-                simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
-            )
-            count = observation.revolutions
-            asked = long, variants, observation, (count,), ranks, "bifurcation"
-            observed = responses_of(*asked, together=TOGETHER, checkpoint=session.opened())[:, 0]
-            coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
-            content = session.write(
-                dataset.dataset(
-                    "bifurcation", coords, {points.names[0]: points.values[:, 0], "observed": observed},
-                    session.attributes, points.units, what,
-                    points.words,
-                )
-            )  # fmt: skip
-        session.close()
-    return session.finished(content, began)
+
+    def make(session: Session) -> Results:
+        session.describe(scene)
+        changes = {
+            "study": None,
+            "numerics.target_error": None,
+            "numerics.transient_revolutions": observation.transient,
+            "numerics.averaged_revolutions": count,
+        }
+        variants = [dict.fromkeys(points.paths[0], float(one)) for one in varied]
+        long = scene.with_(changes)
+        short = simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
+        asked = long, variants, observation, (count,), ranks, "bifurcation"
+        observed = responses_of(*asked, together=TOGETHER, checkpoint=session.opened())[:, 0]
+        coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
+        data = {points.names[0]: varied, "observed": observed}
+        about = session.attributes, points.units, observation.described(short), points.words
+        return session.write(dataset.dataset("bifurcation", coords, data, *about))
+
+    return Session(place, key, ranks, options).finished("bifurcation", make)

@@ -4,7 +4,6 @@ Root follows the effect screening (`hpcclear.ensemble.certificate`); what it req
 points for every variant, simulated on all ranks and kept in the checkpoint."""
 
 import json
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -49,27 +48,23 @@ def run_effects(
 
     Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     trial = Trial(scene)
     plan = trial.plan(wanted)
     place = Place.of_file(output, options.fresh)
     asked = {name: str(value) for name, value in wanted._asdict().items()}
-    with Session(place, {**run_key(scene, "effects"), **asked}, ranks, options) as session:
-        content = session.found("effects")
-        times: dict[str, str] | None = None
-        if content is None:
-            session.describe(scene)
-            content = _certified(trial, plan, session)
-            with ranks.stage("effects: cost"):
-                variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
-                times = times_of(trial.seconds(variants))
-        session.close(times)
-    return session.finished(content, began)
+    session = Session(place, {**run_key(scene, "effects"), **asked}, ranks, options)
+
+    def times(content: Results) -> dict[str, str]:
+        with ranks.stage("effects: cost"):
+            variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
+            return times_of(trial.seconds(variants))
+
+    return session.finished("effects", lambda here: _certified(trial, plan, here), times)
 
 
 def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
-    points = trial.drawn.points(0, 1)
-    checkpoint = session.opened(points.units)
+    session.describe(trial.scene)
+    checkpoint = session.opened(trial.drawn.points(0, 1).units)
     first = 0
     announce(f"compiling {len(trial.switches) + 1} variants", session.options.style)
     session.ranks.everywhere("compile", compile_share, trial.payloads())

@@ -1,6 +1,5 @@
 """The `map` command: one or two entries of a scene over a grid, and at each point what the motion does."""
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place,
 from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
+from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
@@ -114,23 +114,17 @@ def run_map(
 
     `grid` gives the file back as a grid. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     place = Place.of_file(output, options.fresh)
     points, shape = cells(scene, axes)
     key = {**sample_key(scene, points), "command": "map"}
-    with Session(place, key, ranks, options) as session:
-        content = session.found("samples")
-        if content is None:
-            session.describe(scene, mapped=True)
-            checkpoint = session.opened(points.units)
-            progress = Progress("cells", options.style)
-            where, kind = (ranks, checkpoint, progress), session.record
-            records = sample_points(
-                scene, points, *where, stage="map", maker=make_mapper, record=kind
-            )
-            attributes = {**session.attributes, SHAPE: " ".join(map(str, shape))}
-            with saving(checkpoint.flush):
-                cells_of = samples_of(points, records, attributes, joints=session.joints)
-                content = session.write(cells_of)
-        session.close()
-    return session.finished(content, began)
+
+    def make(session: Session) -> Results:
+        session.describe(scene, mapped=True)
+        checkpoint = session.opened(points.units)
+        where, kind = (ranks, checkpoint, Progress("cells", options.style)), session.record
+        records = sample_points(scene, points, *where, stage="map", maker=make_mapper, record=kind)
+        attributes = {**session.attributes, SHAPE: " ".join(map(str, shape))}
+        with saving(checkpoint.flush):
+            return session.write(samples_of(points, records, attributes, joints=session.joints))
+
+    return Session(place, key, ranks, options).finished("samples", make)

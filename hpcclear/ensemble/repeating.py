@@ -86,7 +86,7 @@ def _samples(content: Results, scene: Scene) -> Results:
         if one.attrs.get("role") == "design_variable"
     }
     paths = {str(one.attrs.get("scene_path", name)): one for name, one in rows.items()}
-    points = as_points(scene, {path: one.to_numpy() for path, one in paths.items()})
+    points = as_points(scene, {path: one.values for path, one in paths.items()})
     records = evaluate_records(scene, points)
     named = replace(points, names=tuple(rows))
     return samples_of(named, records, {}, scene.objective, scene.joint_labels)
@@ -105,7 +105,7 @@ def _differing(ours: Results, theirs: Results) -> Iterator[str]:
         if name not in ours:
             yield f"{name} (not here)"
             continue
-        here, was = ours[name].to_numpy(), there.to_numpy()
+        here, was = ours[name].values, there.values
         if here.shape != was.shape:
             yield f"{name} (another length)"
         elif not np.array_equal(here, was, equal_nan=was.dtype.kind == "f"):

@@ -1,6 +1,5 @@
 """Designs of a scene through the dynamics, on all ranks, checkpointed on the way; the `sample` command, which writes them."""
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,7 +63,6 @@ def run_sample(
     NAME.timing.nc goes beside the output, finished samples into a hidden directory until it is written; those of a `part`
     into a file of their own. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     points = design(scene, table)
     if part is None:
         rows, key = range(len(points)), sample_key(scene, points)
@@ -72,14 +70,9 @@ def run_sample(
     else:
         rows, key = part.rows(len(points)), part.key(scene, points)
         place = Place.of_file(part.place(output), False)
-    with Session(place, key, ranks, options) as session:
-        samples = session.found("samples")
-        if samples is None:
-            samples = _simulate(
-                scene, points.take(slice(rows.start, rows.stop)), session, rows.start
-            )
-        session.close()
-    return session.finished(samples, began)
+    chosen = points.take(slice(rows.start, rows.stop))
+    session = Session(place, key, ranks, options)
+    return session.finished("samples", lambda here: _simulate(scene, chosen, here, rows.start))
 
 
 def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
@@ -126,7 +119,6 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
     `output`: the name that was given with each part.
     Raises InputError: parts are missing, damaged, or another run's. Raises StorageError: the disk refuses.
     """
-    began = time.perf_counter()
     place = Place.of_file(output, False)
     with Session(place, sample_key(scene, points), ranks, DEFAULT_OPTIONS) as session:
         samples = session.found("samples")
@@ -136,7 +128,7 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
             )
             session.describe(scene)
             samples = _write(session, scene, points, records)
-    return session.finished(samples, began)
+    return Finished(samples, place.output, place.timing)
 
 
 def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarray:

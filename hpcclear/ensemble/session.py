@@ -10,12 +10,11 @@ import os
 import re
 import shlex
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -173,18 +172,13 @@ def _occupied(folder: Path, key: Mapping[str, str]) -> str:
     return ""
 
 
-@dataclass(frozen=True)
-class Finished:
+class Finished(NamedTuple):
     """A command's results, for whoever prints them."""
 
     content: Results
     output: Path
     timing: Path
     """output and timing: files of the content and of the times."""
-    seconds: float
-    """Wall time of the command."""
-    spent: np.ndarray
-    """Shape (ranks, 4): seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`."""
 
 
 class Session:
@@ -229,6 +223,24 @@ class Session:
     def __exit__(self, *error: object) -> None:
         clear()
         self._lock.release()
+
+    def finished(
+        self,
+        kind: str,
+        make: Callable[[Session], Results],
+        times: Callable[[Results], Mapping[str, str]] | None = None,
+    ) -> Finished:
+        """Return the file of this kind that a command writes: of an earlier run, else what `make` returns and has written.
+
+        `times`: from new results to what the file of times says of them. Call it instead of entering the context.
+        """
+        with self:
+            content, measured = self.found(kind), None
+            if content is None:
+                content = make(self)
+                measured = None if times is None else times(content)
+            self.close(measured)
+        return Finished(content, self.place.output, self.place.timing)
 
     def found(self, kind: str) -> Results | None:
         """The file of an earlier run of the same command, if it is there; another run's is refused."""
@@ -296,13 +308,6 @@ class Session:
             self._checkpoint.finish()
         else:  # the run that finished may have been killed before it could
             discard(self.place.parts)
-
-    def finished(self, content: Results, began: float) -> Finished:
-        """What to print of a run that wrote one file, or found it; `began`: by `time.perf_counter`."""
-        spent = np.zeros((self.ranks.size, len(COLUMNS)))
-        spent = sum(self.ranks.stage_seconds.values(), spent)
-        seconds = time.perf_counter() - began
-        return Finished(content, self.place.output, self.place.timing, seconds, spent)
 
 
 def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> Results:

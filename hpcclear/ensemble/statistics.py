@@ -62,7 +62,6 @@ def run_statistics(
     NAME.timing.nc goes beside the output, what is unfinished into a hidden directory, the samples themselves to the directory
     `raw`, if there is one, a file of kind ``samples`` for every 4096. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     if scene.study is None or scene.study.method != "monte-carlo":
         method = None if scene.study is None else scene.study.method
         reason = "statistics are streamed for Monte Carlo samples only"
@@ -83,7 +82,7 @@ def run_statistics(
         if content is None:
             content = _Streaming(scene, points, session, folder).run()
         session.close()
-    return session.finished(content, began)
+    return Finished(content, place.output, place.timing)
 
 
 @contextmanager

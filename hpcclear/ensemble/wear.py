@@ -4,7 +4,6 @@ Root follows the lives (`hpcclear.dynamics.wear.life`) in parallel: what all of 
 simulated on all ranks and kept in the checkpoint; a resumed run requests the same again and finds it done.
 """
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from hpcclear.ranks.progress import LivesProgress
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers, Points
@@ -160,8 +160,8 @@ def follow(
     states: States,
     ranks: Ranks,
     checkpoint: Checkpoint,
-    first: int = 0,
     style: Style = "quiet",
+    first: int = 0,
 ) -> list[Life]:
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
@@ -249,28 +249,23 @@ def run_wear(
 
     `timing`: where the times go, beside the output by default. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
     check_worn(scene)
     place = Place.of_file(output, options.fresh)
     place = place if timing is None else replace(place, timing=timing)
     inputs = inputs_of(scene)
     joints = joints_of(scene, inputs)
     states = States(scene, inputs, joints)
-    with Session(place, run_key(scene, "wear"), ranks, options) as session:
-        content = session.found("wear")
-        if content is None:
-            session.describe(scene)
-            checkpoint = session.opened(states.points(np.empty((0, len(states.names)))).units)
-            style = options.style
-            lives = follow(scene, joints, states, ranks, checkpoint, style=style)
-            even = None
-            if states.relief.size:  # the same lives, worn evenly, for comparison
-                done = sum(one.simulations for one in lives)
-                evenly = scene.with_({"wear.profile": "uniform"})
-                even = follow(evenly, joints, states, ranks, checkpoint, done, style)
-            with saving(checkpoint.flush):
-                content = session.write(
-                    lives_dataset(scene, inputs, joints, lives, session.attributes, even)
-                )
-        session.close()
-    return session.finished(content, began)
+
+    def make(session: Session) -> Results:
+        session.describe(scene)
+        checkpoint = session.opened(states.points(np.empty((0, len(states.names)))).units)
+        where = joints, states, ranks, checkpoint, options.style
+        lives, even = follow(scene, *where), None
+        if states.relief.size:  # the same lives, worn evenly, for comparison
+            done = sum(one.simulations for one in lives)
+            even = follow(scene.with_({"wear.profile": "uniform"}), *where, first=done)
+        about = joints, lives, session.attributes, even
+        with saving(checkpoint.flush):
+            return session.write(lives_dataset(scene, inputs, *about))
+
+    return Session(place, run_key(scene, "wear"), ranks, options).finished("wear", make)

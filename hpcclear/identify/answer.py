@@ -1,6 +1,5 @@
 """`identify`: an ensemble on all ranks, then what each measured signal says of the unknowns, in one file."""
 
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -38,7 +37,7 @@ def run_identify(
 
     Raises InputError, StorageError, Stopped, RankFailed.
     """
-    began = time.perf_counter()
+
     if not settings.signals and not settings.advise:
         remedy = "Give --signal measured.csv, or --advise"
         raise InputError("--signal", "", "there is nothing to identify from", remedy)
@@ -49,13 +48,12 @@ def run_identify(
         raise InputError("--limit", str(settings.limit), reason, "Give --date for each --signal")
     place = Place.of_file(output, options.fresh)
     key = {**run_key(scene, "identify"), **settings.key()}
-    with Session(place, key, ranks, options) as session:
-        content = session.found("identify")
-        if content is None:
-            session.describe(scene)
-            content = session.write(_identified(scene, inputs, times, session, settings))
-        session.close()
-    return session.finished(content, began)
+
+    def make(session: Session) -> Results:
+        session.describe(scene)
+        return session.write(_identified(scene, inputs, times, session, settings))
+
+    return Session(place, key, ranks, options).finished("identify", make)
 
 
 def _identified(

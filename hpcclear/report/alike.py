@@ -26,8 +26,8 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
         return ""  # there is no recommended design
     least = float(merit.min())
     near = np.isfinite(merit) & (merit - least <= FLAT * abs(least))
-    own = [*again(ours, best), str(best["design"].item())]
-    names = [str(name) for name in ours["design"].to_numpy()[near] if str(name) not in own]
+    own = [*again(ours, best), best.text("design")]
+    names = [str(name) for name in ours["design"].values[near] if str(name) not in own]
     if not names:
         return ""
     together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
@@ -50,11 +50,11 @@ def _lightest(together: Results, best: Results) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
     if not (found := masses(together)):
         return ""
-    whole = np.sum([one.to_numpy() for one in found], axis=0)
+    whole = np.sum([one.values for one in found], axis=0)
     saved = sum(map(float, masses(best))) - float(np.nanmin(whole))
     if not saved > 1e-6:
         return ""
-    name = str(together["design"].to_numpy()[int(np.nanargmin(whole))])
+    name = str(together["design"].values[int(np.nanargmin(whole))])
     return f"; lightest: {name}, {labels.quantity(saved, 'kg', 2)} less"
 
 
@@ -64,7 +64,7 @@ def others(ours: Results, best: Results) -> list[str]:
         return []
     same = [
         *again(ours, best),
-        *(str(one["design"].item()) for one in each(ours, "design") if not satisfies(one)),
+        *(one.text("design") for one in each(ours, "design") if not satisfies(one)),
     ]
     return [name for name in _twins(ours, best) if name not in same]
 
@@ -89,22 +89,22 @@ def again(ours: Results, best: Results) -> list[str]:
     alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
     for variable in variables:
         own = float(best[variable.name])
-        alike &= np.isclose(variable.to_numpy(), own, rtol=1e-9, atol=0.0, equal_nan=True)
-    names = (str(name) for name in ours["design"].to_numpy()[alike])
-    return [name for name in names if name != str(best["design"].item())]
+        alike &= np.isclose(variable.values, own, rtol=1e-9, atol=0.0, equal_nan=True)
+    names = (str(name) for name in ours["design"].values[alike])
+    return [name for name in names if name != best.text("design")]
 
 
 def _overlaps(ours: Results, best: Results, word: str) -> np.ndarray:
-    lower, upper = ours[f"{word}_lower"].to_numpy(), ours[f"{word}_upper"].to_numpy()
+    lower, upper = ours[f"{word}_lower"].values, ours[f"{word}_upper"].values
     return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
 
 
 def _twins(ours: Results, best: Results) -> list[str]:
     """As the file states, else those whose confidence intervals overlap."""
-    names = [str(name) for name in ours["design"].to_numpy()]
-    own = str(best["design"].item())
+    names = ours.texts("design")
+    own = best.text("design")
     if "equivalence" in ours:
-        stated = best["rival"].to_numpy()[best["equivalence"].to_numpy() == 1]
+        stated = best["rival"].values[best["equivalence"].values == 1]
         return [name for name in names if name in stated]
     if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
         return []

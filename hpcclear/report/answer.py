@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from hpcclear.report import alike
-from hpcclear.report.constraints import prices_of, worded
+from hpcclear.report.constraints import constraints_of, worded
 from hpcclear.report.merit import best_of, judged, merit, ours_of
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
@@ -41,9 +41,9 @@ def beyond_hertz(best: Results) -> float:
 def _head(of: Recommended) -> Iterator[Line]:
     """Why the design is recommended, the verdicts on its constraints, and designs that are nearly as good."""
     ours, best = of.ours, of.best
-    case = str(best["case"].item()) if "case" in best else "of the study"
+    case = best.text("case") or "of the study"
     count = ours.sizes["design"]
-    name = str(best["design"].item())
+    name = best.text("design")
     text = f"{name}: {merit(ours, best)} of {count} simulated designs, case {case}"
     yield Line("criterion", text)
     yield from (Line("constraint", text) for text in worded(best))
@@ -58,8 +58,8 @@ def unit_of(one: Results, name: str) -> str:
 
 
 def _sure(of: Recommended) -> Iterator[Line]:
-    missed = str(of.best["accuracy_missed"].item()) if "accuracy_missed" in of.best else ""
-    more = f". Requested accuracy not reached: {missed}" if missed else ""
+    missed = of.best.text("accuracy_missed")
+    more = missed and f". Requested accuracy not reached: {missed}"
     yield Line("confidence", f"{confidence(of.best)}{more}")
 
 
@@ -70,23 +70,19 @@ def confidence(best: Results) -> str:
     text = f"{count} simulations of the recommended design"
     text += " by randomised quasi-Monte Carlo" if best.attrs.get("method") == "qmc" else ""
     if weighted := int(best.get("rare_samples", 0)):
-        text += (
-            f" and {weighted} weighted ones (importance sampling) for its probabilities of failure"
-        )
+        more = f" and {weighted} weighted ones (importance sampling)"
+        text += f"{more} for its probabilities of failure"
     if np.isfinite(level):
-        paired = np.isfinite(float(best.get("mean_tolerance", np.nan)))
-        covered = (
-            "sampling error and the error of the tolerance as far as pairs show it"
-            if paired
-            else "sampling error only"
-        )
+        covered = "sampling error only"
+        if np.isfinite(best.number("mean_tolerance")):
+            covered = "sampling error and the error of the tolerance as far as pairs show it"
         text += f"; {100 * level:.0f} % confidence intervals, which cover {covered}"
     return text
 
 
 def surrogate_errors(best: Results) -> list[float]:
     """Return relative errors of the surrogate's mean and standard deviation, as far as they are known."""
-    found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
+    found = (best.number(f"{word}_error") for word in ("mean", "deviation"))
     return [error for error in found if np.isfinite(error)]
 
 
@@ -95,13 +91,13 @@ def _steps(of: Recommended) -> Iterator[str]:
     ours, best = of.ours, of.best
     if beyond_hertz(best) > MANY:
         yield "stiffer bearings or less load"
-    prices = prices_of(best)
+    prices = [one.price for one in constraints_of(best) if not np.isnan(one.price)]
     if np.inf in prices:
         yield "a smaller numerics.rtol (or target_error), to decide the constraints"
     elif prices:
         key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
         yield f"study.verification.{key}={max(prices):.0f} to decide the constraints"
-    if "on_bounds" in best and str(best["on_bounds"].item()):
+    if best.text("on_bounds"):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in surrogate_errors(best)):
         yield "a larger study.samples, since the surrogate error is large and a better design may have been missed"

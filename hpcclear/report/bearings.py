@@ -9,7 +9,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.outcome import Flag
 from hpcclear.report.figures import labels, motion
-from hpcclear.report.html.content import scene_in
+from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results
 
 ROUNDING = 1e-12
@@ -59,7 +59,7 @@ def bearings(response: Results) -> list[Bearing]:
     inside = averaged(response)
     areas = _projected_areas(response)
     found = []
-    for k, joint in enumerate(map(str, response["joint"].to_numpy())):
+    for k, joint in enumerate(response.texts("joint")):
         peak, gap = (_known(response, name, k) for name in ("peak_contact_force", "mean_gap"))
         if gap == peak == 0.0:
             continue  # an ideal joint of a slider-crank
@@ -83,13 +83,13 @@ def bearings(response: Results) -> list[Bearing]:
 def outside(result: Results) -> str:
     """Return what puts the contact model outside its range: the depth, of a response how deep, and the limit of Hertz theory;
     "" of a contact with a limit of its own (`hpcclear.laws.declared.Geometry.deepest`)."""
-    scene = scene_in(str(result.attrs.get("scene", "")))
+    scene = scene_of(result)
     law = scene and scene.effects.contact
     if not law or law.declared.deepest is not None:
         return ""
     if "penetration" not in result:
         return "indentation above 25 % of clearance, Hertz' limit"
-    deepest = np.nanmax(result["penetration"].to_numpy()[averaged(result)], axis=0)
+    deepest = np.nanmax(result["penetration"].values[averaged(result)], axis=0)
     share = np.nanmax(deepest / motion.clearances(result))
     return f"indentation {100.0 * share:.0f} % of the clearance, Hertz' limit is 25 %"
 
@@ -99,11 +99,11 @@ def torque(response: Results) -> Torque:
     inside = averaged(response)
     if not inside.any():
         return Torque(np.nan, np.nan)
-    peak = float(np.abs(response["crank_moment"].to_numpy()[inside]).max())
+    peak = float(np.abs(response["crank_moment"].values[inside]).max())
     # impacts fall between the stored instants of the torque; the work has each of them
     work, angle = (
         float(one[-1] - one[0])
-        for one in (response[name].to_numpy()[inside] for name in ("driving_work", "crank_angle"))
+        for one in (response[name].values[inside] for name in ("driving_work", "crank_angle"))
     )
     swings = abs(angle) < 0.5 * np.ptp(motion.phase(response)[inside])
     if swings or angle == 0.0 or not _one_drive(response):
@@ -118,23 +118,21 @@ def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
     Of the integrals that every step adds to; where the response has none, of the stored instants.
     """
     if "contact_impulse" in response and "revolution" in response.sizes:
-        time, turned = (
-            one[inside] for one in (response["time"].to_numpy(), motion.phase(response))
-        )
+        time, turned = (one[inside] for one in (response["time"].values, motion.phase(response)))
         count = min(response.sizes["revolution"], response.attrs.get("keep_revolutions", np.inf))
         period, cycle = (float(np.ptp(one)) / count for one in (time, turned))
         flown = _known(response, "contact_loss", k) / cycle
         return _known(response, "contact_impulse", k) / period, min(max(1.0 - flown, 0.0), 1.0)
-    weight = _weights(response["time"].to_numpy()[inside])
+    weight = _weights(response["time"].values[inside])
     if not len(weight):
         return np.nan, np.nan
-    touching = response["penetration"].to_numpy()[inside, k] > 0.0
-    return float(weight @ response["contact_force"].to_numpy()[inside, k]), float(weight @ touching)
+    touching = response["penetration"].values[inside, k] > 0.0
+    return float(weight @ response["contact_force"].values[inside, k]), float(weight @ touching)
 
 
 def _one_drive(response: Results) -> bool:
     """Whether all work is that of a single drive; a slider-crank has no other."""
-    scene = scene_in(str(response.attrs.get("scene"))) if "drive_phase" in response else None
+    scene = scene_of(response) if "drive_phase" in response else None
     return "drive_phase" not in response or (scene is not None and len(scene.linkage.drives) == 1)
 
 
@@ -155,11 +153,11 @@ def _gaining(response: Results) -> list[str]:
     """A sentence for each joint whose impacts gain energy, beyond the half-width of what they lose."""
     if "impact_energy" not in response:
         return []
-    lost, reach = (response[name].to_numpy() for name in ("impact_energy", "impact_energy_limit"))
+    lost, reach = (response[name].values for name in ("impact_energy", "impact_energy_limit"))
     return [
         f"the impacts in {joint} gain energy, {labels.quantity(-float(lost[k]), 'J')} in a revolution: "
         "the contact law is not physical. Check the sign of its damping"
-        for k, joint in enumerate(map(str, response["joint"].to_numpy()))
+        for k, joint in enumerate(response.texts("joint"))
         if lost[k] + reach[k] < 0.0
     ]
 
@@ -225,7 +223,7 @@ def averaged(response: Results) -> Booleans:
 
 def _known(response: Results, name: str, k: int) -> float:
     """A number of joint k; NaN where the response has none."""
-    return float(response[name].to_numpy()[k]) if name in response else np.nan
+    return float(response[name].values[k]) if name in response else np.nan
 
 
 def _weights(time: Array) -> Array:
@@ -239,7 +237,7 @@ def _weights(time: Array) -> Array:
 
 def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
-    if (scene := scene_in(str(response.attrs.get("scene")))) is None:
+    if (scene := scene_of(response)) is None:
         return {}
     pins = {joint: scene.pin(joint) for joint in scene.pins()}
     lengths = {joint: path for joint, one in pins.items() if (path := one.length_path) is not None}

@@ -239,7 +239,7 @@ def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
 def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:
     """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
     if axis == "time":
-        time = response["time"].to_numpy()
+        time = response["time"].values
         return time - time[0], lambda given: given - time[0]
     angle, sense = motion.crank_angle(response)  # times its sense, so that it rises
     first = sense * angle[0]

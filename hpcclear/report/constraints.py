@@ -1,6 +1,7 @@
 """Verdicts on the constraints of designs, in words; programs go by the numbers and codes of the file."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,37 +18,58 @@ OPEN = "the integration tolerance leaves it open"
 """Said of a constraint that no number of simulations would decide."""
 
 
+class Constraint(NamedTuple):
+    """A constraint of a design: what is bounded, its unit, its simulated value with the ends of its interval, the bound."""
+
+    goal: str
+    unit: str
+    true: float
+    lower: float
+    upper: float
+    most: float
+    verdict: Verdict
+    price: float
+    """Simulations that would decide it: infinite where the tolerance leaves it open, NaN where that is not known."""
+
+    @property
+    def deciding(self) -> str:
+        """What would decide it, in words; "" where that is not known."""
+        if np.isinf(self.price):
+            return OPEN
+        known = np.isfinite(self.price)
+        return f"about {self.price:.0f} simulations would decide" if known else ""
+
+    @property
+    def bounded(self) -> str:
+        """Its bound, and the verdict."""
+        return f"at most {quantity(self.most, self.unit)}: {WORDS[self.verdict]}"
+
+    def __str__(self) -> str:
+        text = f"{self.goal} = {quantity(self.true, self.unit)}"
+        if self.lower < self.upper:
+            text += f" (95 % CI {between(self.lower, self.upper, self.unit)})"
+        return f"{text}, {self.bounded}" + (f" ({self.deciding})" if self.deciding else "")
+
+
+def constraints_of(one: Results) -> list[Constraint]:
+    """Return the constraints of a design (of kind ``verification``)."""
+    found = []
+    for own in each(one, "constraint") if "constraint_verdict" in one else ():
+        if (code := int(own["constraint_verdict"])) != ABSENT:
+            names = ("true", "lower", "upper", "most", "price")
+            true, lower, upper, most, price = (own.number(f"constraint_{name}") for name in names)
+            words = own.text("constraint_goal"), own.text("constraint_unit")
+            found.append(Constraint(*words, true, lower, upper, most, Verdict(code), price))
+    return found
+
+
 def verdict_of(one: Results) -> Verdict | None:
-    """Return the verdict on all constraints of a design (of kind ``verification``); None if its case has none."""
-    codes = one["constraint_verdict"].to_numpy() if "constraint_verdict" in one else np.array([])
+    """Return the verdict on all constraints of a design; None if its case has none."""
+    codes = one["constraint_verdict"].values if "constraint_verdict" in one else np.array([])
     found = codes[codes != ABSENT].tolist()
     return together(found) if found else None
 
 
-def prices_of(one: Results) -> list[float]:
-    """Return the simulations that would decide each undecided constraint of a design; infinite where the tolerance leaves it
-    open; those that are not known are left out."""
-    prices = one["constraint_price"].to_numpy() if "constraint_price" in one else np.array([])
-    return [float(price) for price in prices[~np.isnan(prices)]]
-
-
 def worded(one: Results) -> Iterator[str]:
     """Yield constraints of a design: "probability of f above 3 N = 0.01 (95 % CI 0.009 to 0.011), at most 0.05: satisfied"."""
-    if "constraint_verdict" not in one:
-        return
-    for own in each(one, "constraint"):
-        if int(own["constraint_verdict"]) == ABSENT:
-            continue
-        unit = str(own["constraint_unit"].item())
-        value, low, high, most, price = (
-            float(own[f"constraint_{name}"]) for name in ("true", "lower", "upper", "most", "price")
-        )
-        text = f"{own['constraint_goal'].item()} = {quantity(value, unit)}"
-        text += f" (95 % CI {between(low, high, unit)})" if low < high else ""
-        verdict = Verdict(int(own["constraint_verdict"]))
-        text += f", at most {quantity(most, unit)}: {WORDS[verdict]}"
-        if np.isinf(price):
-            text += f" ({OPEN})"
-        elif np.isfinite(price):
-            text += f" (about {price:.0f} simulations would decide)"
-        yield text
+    return map(str, constraints_of(one))

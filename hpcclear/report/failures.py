@@ -33,13 +33,13 @@ class SampledVariable(NamedTuple):
 def explained(samples: Results) -> list[str]:
     """Return a sentence for each status of failed samples (kind ``samples``): how many, why, in which ranges of which
     variables, what to do."""
-    return list(sentences(samples["status"].to_numpy(), variables(samples)))
+    return list(sentences(samples["status"].values, variables(samples)))
 
 
 def variables(samples: Results) -> list[SampledVariable]:
     """Return the design variables of samples (kind ``samples``)."""
     return [
-        SampledVariable(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
+        SampledVariable(labels.words(one), str(one.attrs.get("units", "1")), one.values)
         for one in labels.design_variables(samples)
     ]
 

@@ -47,9 +47,9 @@ def named(name: object) -> str:
 
 def _records(content: Results) -> list[Line]:
     found = []
-    for k, record in enumerate(content["record"].to_numpy()):
+    for k, record in enumerate(content["record"].values):
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
-        for u, name in enumerate(content["unknown"].to_numpy()):
+        for u, name in enumerate(content["unknown"].values):
             found.append(Line(named(name), before + interval(content, k, u)))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
             found.append(Line("together", before + _together(content, k)))
@@ -58,7 +58,7 @@ def _records(content: Results) -> list[Line]:
 
 
 def _calibration(content: Results, record: int) -> str:
-    share, factor = (content[name].to_numpy()[record] for name in ("coverage", "widening"))
+    share, factor = (content[name].values[record] for name in ("coverage", "widening"))
     shown = " and ".join(f"{100 * one:.0f} %" for one in share)
     wider = " and ".join(f"{one:.2g}" for one in factor)
     return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
@@ -69,12 +69,12 @@ def _together(content: Results, record: int) -> str:
     related = float(content["correlation"][record])
     if abs(related) <= TOGETHER:
         return f"identified separately (correlation {related:.2f})"
-    names = [short(name) for name in content["unknown"].to_numpy()]
-    units = set(content["unit"].to_numpy().astype(str))
+    names = [short(name) for name in content["unknown"].values]
+    units = set(content["unit"].values.astype(str))
     text = f"not identified separately (correlation {related:.2f})"
     if len(units) > 1:
         return text
-    places = content["posterior"].to_numpy()[record, :, : len(names)]
+    places = content["posterior"].values[record, :, : len(names)]
     weights = np.linalg.eigh(np.cov(places.T))[1][:, 0]  # the direction of the least variance
     weights = weights / np.abs(weights).sum() * np.sign(weights[np.argmax(np.abs(weights))])
     low, middle, high = np.quantile(places @ weights, (0.025, 0.5, 0.975))
@@ -88,7 +88,7 @@ def _together(content: Results, record: int) -> str:
 
 def interval(content: Results, record: int, unknown: int) -> str:
     """Return the median and interval of an unknown, no more digits than the interval allows; a bound where it is cut off."""
-    unit = str(content["unit"].to_numpy()[unknown])
+    unit = str(content["unit"].values[unknown])
     if not int(content["explained"][record]):
         return "not identified: the model does not explain this signal"
     low, middle, high = (float(one) for one in content["interval"][record, unknown])
@@ -108,11 +108,11 @@ def interval(content: Results, record: int, unknown: int) -> str:
 def _growth(content: Results) -> list[Line]:
     if "rate" not in content:
         return []
-    found, used = [], int(content["explained"].to_numpy().sum())
+    found, used = [], int(content["explained"].values.sum())
     every = content.sizes["record"]
     of = f", from the {used} of {every} records that the model explains" if used < every else ""
-    for u, name in enumerate(content["unknown"].to_numpy()):
-        unit = str(content["unit"].to_numpy()[u])
+    for u, name in enumerate(content["unknown"].values):
+        unit = str(content["unit"].values[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
         found.append(
             Line(f"growth, {named(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
@@ -133,12 +133,12 @@ def _advice(content: Results) -> list[Line]:
     if "expected_half_width" not in content:
         return []
     found = []
-    counts = content["revolutions"].to_numpy()
-    for k, name in enumerate(content["candidate"].to_numpy()):
+    counts = content["revolutions"].values
+    for k, name in enumerate(content["candidate"].values):
         parts = []
-        for u, unknown in enumerate(content["unknown"].to_numpy()):
-            unit = str(content["unit"].to_numpy()[u])
-            widths = content["expected_half_width"].to_numpy()[k, :, u]
+        for u, unknown in enumerate(content["unknown"].values):
+            unit = str(content["unit"].values[u])
+            widths = content["expected_half_width"].values[k, :, u]
             shown = ", ".join(
                 f"{rounded(float(width), unit)} ({count})"
                 for width, count in zip(widths, counts, strict=True)
@@ -154,9 +154,9 @@ def _advice(content: Results) -> list[Line]:
 def warnings(content: Results) -> list[str]:
     """Return what makes a result doubtful."""
     found = []
-    for k, record in enumerate(content["record"].to_numpy() if "record" in content else ()):
+    for k, record in enumerate(content["record"].values if "record" in content else ()):
         doubt = float(content["doubt"][k])
-        worst = str(content["feature"].to_numpy()[int(content["worst_feature"][k])])
+        worst = str(content["feature"].values[int(content["worst_feature"][k])])
         if not int(content["explained"][k]):
             found.append(
                 f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "

@@ -20,7 +20,7 @@ def recommended(verified: Results) -> str:
 
 def goals_of(one: Results) -> list[str]:
     """Objectives of the case of a design, where the file has them: "first", "second", and further ones."""
-    return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
+    return [name for name in ORDINALS if f"{name}_goal" in one and one.text(f"{name}_goal")]
 
 
 def leading_goals(verified: Results) -> list[str]:
@@ -28,7 +28,7 @@ def leading_goals(verified: Results) -> list[str]:
     if not any(map(counts, each(verified, "design"))):
         return []
     first = ours_of(verified).isel(design=0)
-    return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
+    return [first.text(f"{name}_goal") for name in goals_of(first)]
 
 
 def usual_of(one: Results, name: str) -> Usual:
@@ -48,14 +48,14 @@ def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k, one in enumerate(each(verified, "design")) if counts(one)]
     if "case" in verified:
-        cases = [str(case) for case in verified["case"].to_numpy()]
+        cases = verified.texts("case")
         chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
         rows = [k for k in rows if cases[k] == chosen]
     return verified.isel(design=rows)
 
 
 def _random_inputs(verified: Results, k: int) -> int:
-    return len(str(verified["random"].to_numpy()[k]).split()) if "random" in verified else 0
+    return len(str(verified["random"].values[k]).split()) if "random" in verified else 0
 
 
 def counts(one: Results) -> bool:
@@ -67,7 +67,7 @@ def counts(one: Results) -> bool:
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
     every = each(ours, "design")
-    return next((d for d in every if str(d["design"].item()).split(" ")[-1] == "original"), None)
+    return next((d for d in every if d.text("design").split(" ")[-1] == "original"), None)
 
 
 def best_of(ours: Results) -> Results:
@@ -78,13 +78,13 @@ def best_of(ours: Results) -> Results:
 def judged(ours: Results) -> np.ndarray:
     """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
-        return ours["mean_true"].to_numpy() + SPAN * ours["deviation_true"].to_numpy()
+        return ours["mean_true"].values + SPAN * ours["deviation_true"].values
     verdicts = map(verdict_of, each(ours, "design"))
     found, level = best([Verdict.HOLDS if one is None else one for one in verdicts])
-    merit = ours["first_true"].to_numpy()
+    merit = ours["first_true"].values
     if found is not Verdict.HOLDS and "constraint_excess" in ours:
         # none is surely within: the nearest
-        excess = ours["constraint_excess"].to_numpy()
+        excess = ours["constraint_excess"].values
         within = level & (excess <= 0.0)
         level, merit = (within, merit) if within.any() else (level, excess)
     return np.where(level, merit, np.inf)
@@ -94,11 +94,11 @@ def merit(ours: Results, best: Results) -> str:
     """What `judged` goes by, in words."""
     if is_plain(best):
         return f"lowest mean + {SPAN:g} standard deviations of f"
-    words, found = f"lowest {best['first_goal'].item()}", verdict_of(best)
+    words, found = f"lowest {best.text('first_goal')}", verdict_of(best)
     if found is Verdict.FAILS:
         return "smallest violation of the constraints"
     if found is Verdict.UNDECIDED:
-        inside = float(best.get("constraint_excess", np.nan)) <= 0.0
+        inside = best.number("constraint_excess") <= 0.0
         return (
             f"{words} where estimates satisfy the constraints,"
             if inside

@@ -19,12 +19,12 @@ def joints(response: Results) -> list[list[str]]:
     """Return a row of `HEADER` for each joint with clearance; none where the response has no measures of impact."""
     if "impact_energy" not in response:
         return []
-    names = [str(name) for name in response["joint"].to_numpy()]
+    names = response.texts("joint")
     found = []
     for joint in (one.joint for one in bearings.bearings(response)):
         at = names.index(joint)
         flown, reach = (
-            float(np.degrees(response[name].to_numpy()[at]))
+            float(np.degrees(response[name].values[at]))
             for name in ("contact_loss", "contact_loss_limit")
         )
         found.append(
@@ -45,9 +45,9 @@ def frame(response: Results) -> list[tuple[str, str]]:
         return []
     found = [("RMS force on the frame", _mean(response, "rms_frame_force"))]
     if "frame_force_level" in response:
-        level = response["frame_force_level"].to_numpy()
+        level = response["frame_force_level"].values
         order = np.argsort(-np.nan_to_num(level, nan=-np.inf))[:LOUDEST]
-        bands = response["band"].to_numpy()[order]
+        bands = response["band"].values[order]
         words = ", ".join(
             f"{one:.1f} dB at {band_name(band)}"
             for one, band in zip(level[order], bands, strict=True)
@@ -66,7 +66,7 @@ def band_name(centre: float) -> str:
 
 
 def _mean(response: Results, name: str, at: int | tuple[()] = ()) -> str:
-    value, reach = (float(response[one].to_numpy()[at]) for one in (name, f"{name}_limit"))
+    value, reach = (float(response[one].values[at]) for one in (name, f"{name}_limit"))
     return _with(value, reach, str(response[name].attrs["units"]))
 
 

@@ -67,10 +67,19 @@ class SectionOf(NamedTuple):
     name: str
     title: str
     """name and title: its anchor, and its heading."""
-    make: "Callable[[Content], Sequence[object] | None]"
-    """From the results to its parts: texts, tables, and text whose lines stay; None where there is nothing to show."""
+    make: "Callable[..., Sequence[object] | None]"
+    """From the file of its kind, if it names one, and all results to its parts: texts, tables, and text whose lines stay; None
+    where there is nothing to show."""
+    kind: str = ""
+    """Of the file without which there is nothing to show."""
     each: bool = False
     """Whether each of several samples has one by itself."""
+
+    def parts(self, content: Content) -> Sequence[object]:
+        """Its parts; none where there is nothing to show."""
+        if not self.kind:
+            return self.make(content) or ()
+        return (self.kind in content.files and self.make(content.files[self.kind], content)) or ()
 
 
 class Recommended(NamedTuple):
@@ -84,8 +93,8 @@ class Recommended(NamedTuple):
 
     def of_best(self, kind: str) -> Results | None:
         """What a file with a row for each design says of the recommended one; None where it says nothing."""
-        found, name = self.files.get(kind), str(self.best["design"].item())
-        known = found is not None and name in found["design"].to_numpy()
+        found, name = self.files.get(kind), self.best.text("design")
+        known = found is not None and name in found["design"].values
         return found.sel(design=name) if found is not None and known else None
 
 

@@ -43,16 +43,16 @@ def lines(of: Recommended) -> Iterator[Line]:
 
 def _inputs(own: Results, kind: str) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
     """Names of the random inputs that are known, a number of each, its standard error, and their rows, each (n,)."""
-    rows = np.flatnonzero(np.isfinite(own["contribution"].to_numpy()))
-    values, errors = (own[f"{kind}{end}"].to_numpy()[rows] for end in ("", "_error"))
-    return [str(name) for name in own["input"].to_numpy()[rows]], values, errors, rows
+    rows = np.flatnonzero(np.isfinite(own["contribution"].values))
+    values, errors = (own[f"{kind}{end}"].values[rows] for end in ("", "_error"))
+    return [str(name) for name in own["input"].values[rows]], values, errors, rows
 
 
 def shares(own: Results) -> list[tuple[str, float, float]]:
     """Return the random inputs of a design (of kind ``contributions``) with their shares of the variance and half-widths, the
     largest first; correlated inputs have one together."""
     names, values, errors, rows = _inputs(own, "contribution")
-    groups = own["group"].to_numpy()[rows]
+    groups = own["group"].values[rows]
     parts = []
     for k, group in enumerate(groups.tolist()):
         its = np.flatnonzero(groups == group) if group > 0 else [k]
@@ -65,9 +65,9 @@ def shares(own: Results) -> list[tuple[str, float, float]]:
 def tighten(own: Results) -> Iterator[str]:
     """Yield which inputs of a design (of kind ``contributions``) to tighten first, where there are several."""
     names, falls, errors, rows = _inputs(own, "halved")
-    prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
+    prices = own["halving_cost"].values[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
-        joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
+        joint = [own.number(f"halved_together{end}") for end in ("", "_error")]
         yield _first(names, falls, errors, prices, joint)
 
 
@@ -107,16 +107,14 @@ def _worst(of: Recommended) -> Iterator[Line]:
     if not np.isfinite(value):
         return
     unit = str(own["worst"].attrs["units"])
-    there = zip(
-        *(own[key].to_numpy() for key in ("input", "searched_at", "input_unit")), strict=True
-    )
+    there = zip(*(own[key].values for key in ("input", "searched_at", "input_unit")), strict=True)
     listed = ", ".join(f"{n} = {quantity(float(x), str(u))}" for n, x, u in there if np.isfinite(x))
     text = f"f reaches at least {quantity(value, unit)} within the bounds of the random inputs, at {listed} "
     text += f"({int(own['tried'])} simulations"
     if np.isfinite(corner) and corner < value:
         text += f"; {quantity(corner, unit)} at their corners"
     text += "; the largest value found is a lower bound of the worst case)"
-    loose = [str(one) for one in own["input"].to_numpy()[own["without_bounds"].to_numpy() != 0]]
+    loose = [str(one) for one in own["input"].values[own["without_bounds"].values != 0]]
     if loose:
         text += f". Without bounds, taken within three standard deviations: {', '.join(loose)}"
     yield Line("worst case", text)
@@ -156,14 +154,14 @@ def _indices(of: Recommended) -> Iterator[Line]:
     found = of.files.get("sensitivity")
     if found is None or "sobol_total" not in found:
         return
-    total, error = (found[f"sobol_total{end}"].to_numpy() for end in ("", "_error"))
+    total, error = (found[f"sobol_total{end}"].values for end in ("", "_error"))
     if not total.size or not np.isfinite([total, error]).all():
         return
-    names = [str(name) for name in found["parameter"].to_numpy()]
+    names = found.texts("parameter")
     parts = [(name, v, HALF_WIDTH * e) for name, v, e in zip(names, total, error, strict=True)]
     words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
     yield Line("interactions", f"{words}: {_listed(parts)}")
-    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
+    noise, doubt = (found.number(f"sobol_noise{end}") for end in ("", "_error"))
     if noise > HALF_WIDTH * doubt and noise > LITTLE:
         text = f"{share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
         yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
@@ -172,7 +170,7 @@ def _indices(of: Recommended) -> Iterator[Line]:
 def half_width(found: Results | None) -> float:
     """Return the largest half-width of a Sobol index of a file (kind ``sensitivity``); 0 where it has none."""
     names = [f"sobol_{kind}_error" for kind in ("first", "total")]
-    errors = [found[name].to_numpy() for name in names if found is not None and name in found]
+    errors = [found[name].values for name in names if found is not None and name in found]
     return max((HALF_WIDTH * float(np.nanmax(one)) for one in errors if one.size), default=0.0)
 
 
@@ -188,7 +186,7 @@ def _chaos(of: Recommended) -> Iterator[Line]:
     own = of.of_best("chaos")
     if own is None:
         return
-    moved = of.files["chaos"]["chaotic"].to_numpy() > SOME
+    moved = of.files["chaos"]["chaotic"].values > SOME
     text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
         text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"

@@ -1,6 +1,6 @@
 """The first screen of results: what the page opens with and what commands print, from the numbers and codes of the files.
 
-Each kind of result makes its own (`ScreenOf` in `PARTS` of a module of `hpcclear.report.screens`); nobody reads its words back.
+Each kind of result makes its own, in a module of `hpcclear.report.screens`; nobody reads its words back.
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,6 +31,21 @@ class Trust(NamedTuple):
     text: str
     place: str = ""
     """Subject of the page on which more is said."""
+
+    @classmethod
+    def red(cls, text: str, place: str = "") -> "Trust":
+        """A line of this level."""
+        return cls(Level.RED, text, place)
+
+    @classmethod
+    def amber(cls, text: str, place: str = "") -> "Trust":
+        """A line of this level."""
+        return cls(Level.AMBER, text, place)
+
+    @classmethod
+    def green(cls, text: str, place: str = "") -> "Trust":
+        """A line of this level."""
+        return cls(Level.GREEN, text, place)
 
 
 class Tile(NamedTuple):
@@ -165,6 +180,11 @@ def change(after: Sequence[float], before: Sequence[float]) -> tuple[str, bool |
     if np.isfinite(reach) and abs(moved) <= reach:
         return "no significant change", None
     return f"{100.0 * moved:+.0f} %".replace("-", "\N{MINUS SIGN}"), moved < 0.0
+
+
+def upper(text: str) -> str:
+    """Return a text as the beginning of a sentence."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def lower(text: str) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcclear.report.figures import labels, style
 from hpcclear.report.html import gallery
-from hpcclear.report.html.content import Content, read, scene_in
+from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of
@@ -122,7 +122,7 @@ def sheet_of(content: Content, screen: Screen | None) -> SheetContent:
 
 
 def _assumptions(content: Content) -> Iterator[str]:
-    scene = scene_in(content.attribute("scene"))
+    scene = content.scene
     if scene is None:
         yield "Not known: this version cannot read the scene of the files."
         return
@@ -142,15 +142,11 @@ def _assumptions(content: Content) -> Iterator[str]:
 
 def _limits(content: Content) -> Iterator[str]:
     yield "No interval covers the difference between model and machine."
-    scene = scene_in(content.attribute("scene"))
-    if scene is None:
+    if (scene := content.scene) is None:
         return
     variables = scene.study.variables if scene.study is not None else ()
-    words = [
-        f"{one.name} {labels.between(*one.range, one.unit)}"
-        for one in variables
-        if one.range is not None
-    ]
+    ranges = ((one, one.range) for one in variables if one.range is not None)
+    words = [f"{one.name} {labels.between(*ends, one.unit)}" for one, ends in ranges]
     if words:
         yield f"Designs were searched within {'; '.join(words)}."
     yield from scene.warnings

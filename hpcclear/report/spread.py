@@ -152,8 +152,8 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
         )
         for level in (LEVELS if drawn else LEVELS[:1])
     ]
-    for joint in samples["joint"].to_numpy() if drawn and "peak_contact_force" in samples else ():
-        peak = samples["peak_contact_force"].sel(joint=joint).to_numpy()
+    for joint in samples["joint"].values if drawn and "peak_contact_force" in samples else ():
+        peak = samples["peak_contact_force"].sel(joint=joint).values
         if np.nanmax(peak, initial=0.0) > 0.0:
             lines.append(Line(f"P95 peak force, {joint}", *_quantile(peak, 0.95, "N", drawn)))
     lines += shares(samples, thresholds)
@@ -169,7 +169,7 @@ def in_time(samples: Results) -> list[Line]:
     """Return how well f is known in each sample: its half-width, and its standard deviation between revolutions."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
     f, remedy = (
-        np.abs(samples["objective"].to_numpy()),
+        np.abs(samples["objective"].values),
         "set numerics.target_error for one of each sample",
     )
     if "objective" in samples.attrs:
@@ -179,7 +179,7 @@ def in_time(samples: Results) -> list[Line]:
         ("half-width of f", name),
         ("cycle-to-cycle std. dev.", "objective_spread"),
     ):
-        parts = samples[column].to_numpy() / f if column in samples else np.array([])
+        parts = samples[column].values / f if column in samples else np.array([])
         if np.isfinite(parts).any():
             text = f"median {100 * np.nanmedian(parts):.2f} %, largest {100 * np.nanmax(parts):.2f} % of f"
             lines.append(Line(label, text))
@@ -204,7 +204,7 @@ def side_by_side(
     found = {}
     for name, samples in every.items():
         units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}
-        joints = [str(joint) for joint in samples["joint"].to_numpy()]
+        joints = samples.texts("joint")
         levels = [beyond(units, words, joints) for words in thresholds]
         count = samples.sizes["sample"]
         lines = [Line("samples", str(count), StatedValue(count)), *statistics(samples, levels)]
@@ -223,14 +223,14 @@ def rows_of(found: Lines) -> list[list[str]]:
 
 def remarks(samples: Results) -> list[str]:
     """Return what the warnings of `simulate` say of these samples, each with the number of samples that it is about."""
-    good = samples["status"].to_numpy() == Status.OK
+    good = samples["status"].values == Status.OK
     found = []
     f, half_width = (_values(samples, f"objective{end}") for end in ("", "_uncertainty"))
     sensitive = half_width > bearings.SENSITIVE * np.abs(f)
     if "regime" not in samples and sensitive.any():
         worst = float(np.nanmax((half_width / np.abs(f))[sensitive]))
         found.append((int(sensitive.sum()), bearings.sensitive_words(worst, samples)))
-    flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(f), int)
+    flags = samples["flags"].values if "flags" in samples else np.zeros(len(f), int)
     counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
     found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
     return [f"{count} of {len(f)} samples: {text}" for count, text in found]
@@ -250,7 +250,7 @@ def _length_of_peaks(samples: Results) -> list[Line]:
 
 def _values(samples: Results, name: str) -> Array:
     """A result of each sample, shape (n,); at joints the largest."""
-    values = samples[name].to_numpy()
+    values = samples[name].values
     return values.max(axis=1) if values.ndim > 1 else values
 
 

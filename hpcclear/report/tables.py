@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.units import factor, fits, is_written_in
 from hpcclear.base.written import reading, text_of, unit_for
 from hpcclear.report.figures import labels
-from hpcclear.report.html.content import scene_in
+from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.names import KINDS
 
@@ -127,7 +127,7 @@ class _Table:
     def _filled(self, one: Variable) -> np.ndarray:
         """Values of every row, repeated along dimensions that the variable lacks."""
         sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
-        return np.broadcast_to(one.to_numpy().reshape(sizes), self.shape).ravel()
+        return np.broadcast_to(one.values.reshape(sizes), self.shape).ravel()
 
 
 def _lower_edges(
@@ -148,7 +148,7 @@ def _label(content: Results, dim: str, place: int) -> str:
     """What a place along a dimension is called in a heading."""
     if dim not in content:
         return str(place)
-    value = content[dim].to_numpy()[place]
+    value = content[dim].values[place]
     return f"{value:g}" if isinstance(value, np.floating) else str(value)
 
 
@@ -158,7 +158,7 @@ class Units:
     def __init__(self, content: Results, asked: Sequence[str]) -> None:
         self._si = list(asked) == [SI]
         self._asked = [] if self._si else list(asked)
-        self._scene = None if self._si else scene_in(str(content.attrs.get("scene", "")))
+        self._scene = None if self._si else scene_of(content)
         known = {str(v.attrs.get("units", "")) for v in content.variables.values()}
         for unit in self._asked:
             if not any(fits(unit, one) for one in known if one not in ("", "1")):
@@ -168,7 +168,7 @@ class Units:
 
     def shown(self, variable: Variable) -> tuple[np.ndarray, str]:
         """Values and their unit; codes as words, without one."""
-        values, unit = variable.to_numpy(), str(variable.attrs.get("units", ""))
+        values, unit = variable.values, str(variable.attrs.get("units", ""))
         if "flag_meanings" in variable.attrs:
             return _words(variable), ""
         if unit in ("", "1") or values.dtype.kind != "f":
@@ -203,7 +203,7 @@ class Units:
 def _words(variable: Variable) -> np.ndarray:
     """Codes (any shape) as the words of their meanings; several flags of one value are joined by a plus sign."""
     meanings = str(variable.attrs["flag_meanings"]).split()
-    codes = variable.to_numpy()
+    codes = variable.values
     single = "flag_values" in variable.attrs
     numbers = np.atleast_1d(variable.attrs["flag_values" if single else "flag_masks"])
     words: Mapping[int, str] = dict(zip(map(int, numbers), meanings, strict=True))

@@ -133,7 +133,7 @@ def _own(found: Results, scene: Scene) -> Way | None:
     Its error is that of the next looser tolerance, shorter transient and shorter average that were measured: no more is known,
     and so it is not below the cheapest of these.
     """
-    numerics, tolerance = scene.numerics, found["tolerance"].to_numpy()
+    numerics, tolerance = scene.numerics, found["tolerance"].values
     waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
     near = 1.0 + 1e-9  # as it was written and as it was measured
     looser = np.flatnonzero(tolerance * near >= numerics.rtol)
@@ -143,11 +143,11 @@ def _own(found: Results, scene: Scene) -> Way | None:
     price = np.interp(
         np.log(numerics.rtol),
         np.log(tolerance[order]),
-        found["tolerance_seconds"].to_numpy()[order],
+        found["tolerance_seconds"].values[order],
     )
     bias = _largest_bias(found)[looser[np.argmin(tolerance[looser])]]
-    row = int((found["transient"].to_numpy() <= waited).sum()) - 1
-    column = int((found["averaged"].to_numpy() <= averaged).sum()) - 1
+    row = int((found["transient"].values <= waited).sum()) - 1
+    column = int((found["averaged"].values <= averaged).sum()) - 1
     words = f"rtol {_short(numerics.rtol)}, {waited} transient and {averaged} averaged revolutions"
     error = float(np.hypot(bias, _averaging(found)[row, column]))
     return Way(float(price) * (waited + averaged), error, words)
@@ -155,17 +155,15 @@ def _own(found: Results, scene: Scene) -> Way | None:
 
 def _averaging(found: Results) -> Array:
     """Errors of averages by transient and revolutions: at least those of every longer run, as less would be luck."""
-    error = found["averaging_error"].to_numpy()[::-1, ::-1]
+    error = found["averaging_error"].values[::-1, ::-1]
     return np.asarray(np.maximum.accumulate(np.maximum.accumulate(error, 0), 1)[::-1, ::-1])
 
 
 def _largest_bias(found: Results) -> Array:
     """Largest bias of each tolerance by two standard errors; a value below that of a tighter one would be luck."""
-    bias = (
-        np.abs(found["tolerance_bias"].to_numpy()) + 2.0 * found["tolerance_bias_error"].to_numpy()
-    )
+    bias = np.abs(found["tolerance_bias"].values) + 2.0 * found["tolerance_bias_error"].values
     known = np.where(np.isfinite(bias), bias, np.nanmin(bias) if np.isfinite(bias).any() else 0.0)
-    order = np.argsort(found["tolerance"].to_numpy())
+    order = np.argsort(found["tolerance"].values)
     largest = np.empty_like(known)
     largest[order] = np.maximum.accumulate(known[order])
     return largest
@@ -180,10 +178,8 @@ def _ways_of(found: Results, k: int, bias: float) -> Iterator[Way]:
         yield Way(price * (count + wait), float(np.hypot(bias, np.sqrt(variance / count))), words)
     if "averaging_error" not in found:
         return
-    for row, transient in zip(
-        _averaging(found), found["transient"].to_numpy().tolist(), strict=True
-    ):
-        for one, averaged in zip(row, found["averaged"].to_numpy().tolist(), strict=True):
+    for row, transient in zip(_averaging(found), found["transient"].values.tolist(), strict=True):
+        for one, averaged in zip(row, found["averaged"].values.tolist(), strict=True):
             words = f"rtol {rtol}, {transient} transient and {averaged} averaged revolutions"
             yield Way(price * (transient + averaged), float(np.hypot(bias, one)), words)
 

@@ -87,7 +87,7 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     timing = run.directory / "timing.nc"
     found = run_wear(own, run.directory / name, run.ranks, options, timing).content
     oldest = max(row.cycles or 0.0 for row in scene.required_study.worn)
-    parts, at = (np.arange(AGES) + 0.5) / AGES, found["cycle"].to_numpy()
+    parts, at = (np.arange(AGES) + 0.5) / AGES, found["cycle"].values
     values = np.full((found.sizes["life"], AGES), np.nan)
     for k, (end, f) in enumerate(
         zip(found["ended"].values, found["objective"].values, strict=True)
@@ -120,8 +120,8 @@ def known(run: StudyRun) -> Scene:
     changes = {}
     for row in run.study.worn:
         joints = [path.split(".")[-2] for path in row.paths]
-        clearance = lives["clearance"].sel(cycle=row.cycles, joint=joints).to_numpy()
-        values = _values(scene, row, clearance, lives["ending"].to_numpy())
+        clearance = lives["clearance"].sel(cycle=row.cycles, joint=joints).values
+        values = _values(scene, row, clearance, lives["ending"].values)
         left = int(np.isnan(clearance).any(axis=1).sum())
         if left:
             run.notify(

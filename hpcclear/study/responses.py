@@ -120,7 +120,7 @@ def _statistics(scene: Scene, response: Results, windows: int) -> Array:
     steady = _steady(scene, response)
     widths = {"contact_force": len(scene.joint_labels), "crank_moment": 1, "slider_acceleration": 1}
     columns = [
-        steady[name].to_numpy().reshape(-1, width)
+        steady[name].values.reshape(-1, width)
         if name in steady  # a linkage may have no slider
         else np.full((steady.sizes["time"], width), np.nan)
         for name, width in widths.items()

@@ -79,6 +79,6 @@ def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> in
         found = run_identify(scene, place, ranks, made, how.options())
         describe_run(found, "identify")
         content = found.content
-        explained = "explained" not in content or bool(content["explained"].to_numpy().all())
+        explained = "explained" not in content or bool(content["explained"].values.all())
         return Exit.DONE if explained else Exit.TARGET_MISSED
     return Exit.DONE

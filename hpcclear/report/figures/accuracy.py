@@ -58,7 +58,7 @@ def _plain(axis: "style.Axes") -> None:
 @style.drawn
 def integration_figure(accuracy: Results) -> "style.Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
-    quantities = [str(q) for q in accuracy["quantity"].to_numpy()]
+    quantities = accuracy.texts("quantity")
     figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
     for row, quantity in enumerate(quantities):
         here = accuracy.sel(quantity=quantity)
@@ -81,8 +81,8 @@ def _ladder(axes: "style.Axes", here: Results, work: str) -> None:
     """One line a method; what the reference cannot resolve is hollow."""
     factor = 1e3 if work == "seconds" else 1.0
     floor = MARGIN * float(here["reference_error"])
-    for k, method in enumerate(here["integrator"].to_numpy()):
-        x, y = here[work].to_numpy()[k] * factor, here["error"].to_numpy()[k]
+    for k, method in enumerate(here["integrator"].values):
+        x, y = here[work].values[k] * factor, here["error"].values[k]
         look, unresolved = {**style.look(k), "ms": 2.8, "mew": 0.6}, y < floor
         axes.loglog(x, y, lw=0.8, label=labels.literal(str(method)), **look)
         axes.plot(x[unresolved], y[unresolved], mfc=style.colour("paper"), **{**look, "ls": "none"})
@@ -97,8 +97,8 @@ def averaging_figure(accuracy: Results) -> "style.Figure":
     """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], accuracy["averaging_error"]
-    for k, transient in enumerate(accuracy["transient"].to_numpy()):
-        y = error.sel(transient=transient).to_numpy()
+    for k, transient in enumerate(accuracy["transient"].values):
+        y = error.sel(transient=transient).values
         panel.loglog(accuracy["averaged"], y, label=str(transient), **style.look(k))
     floor = float(accuracy["averaging_floor"])
     if floor > 0.0:
@@ -125,14 +125,14 @@ def averaging_figure(accuracy: Results) -> "style.Figure":
 def surrogate_figure(accuracy: Results) -> "style.Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
     figure, axes = style.grid(3, 1, 145.0, sharex=True)
-    size, each = accuracy["training"].to_numpy(), float(accuracy["sample_seconds"])
+    size, each = accuracy["training"].values, float(accuracy["sample_seconds"])
     rows = (
-        ("unexplained share $1 - R^2$ (–)", 1.0 - accuracy["r2"].to_numpy()),
-        ("RMAE (–)", accuracy["rmae"].to_numpy()),
-        ("leave-one-out error over std. dev. (–)", accuracy["leave_one_out"].to_numpy()),
+        ("unexplained share $1 - R^2$ (–)", 1.0 - accuracy["r2"].values),
+        ("RMAE (–)", accuracy["rmae"].values),
+        ("leave-one-out error over std. dev. (–)", accuracy["leave_one_out"].values),
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
-        for k, surrogate in enumerate(accuracy["surrogate"].to_numpy()):
+        for k, surrogate in enumerate(accuracy["surrogate"].values):
             panel.loglog(size, values[k], label=surrogate, **style.look(k))
         panel.set_ylabel(words)
     style.key(axes[0, 0])
@@ -151,15 +151,15 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
     """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
     bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
-    for row, moment in enumerate(accuracy["moment"].to_numpy()):
+    for row, moment in enumerate(accuracy["moment"].values):
         here = accuracy.sel(moment=moment)
-        for k, estimate in enumerate(accuracy["estimate"].to_numpy()):
+        for k, estimate in enumerate(accuracy["estimate"].values):
             one = here.sel(estimate=estimate)
-            y = one["moment_error"].to_numpy()
-            bars = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
+            y = one["moment_error"].values
+            bars = [y - one["moment_lower"].values, one["moment_upper"].values - y]
             for column, x in enumerate((accuracy["draws"], one["moment_seconds"])):
                 axes[row, column].errorbar(
-                    x.to_numpy(), y, bars, elinewidth=0.6, label=str(estimate), **style.look(k)
+                    x.values, y, bars, elinewidth=0.6, label=str(estimate), **style.look(k)
                 )
         for panel in axes[row]:
             panel.set(xscale="log", yscale="log")
@@ -190,8 +190,8 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
 def parallel_figure(accuracy: Results) -> "style.Figure":
     """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
-    number = accuracy["ranks"].to_numpy()
-    strong, weak = accuracy["strong_seconds"].to_numpy(), accuracy["weak_seconds"].to_numpy()
+    number = accuracy["ranks"].values
+    strong, weak = accuracy["strong_seconds"].values, accuracy["weak_seconds"].values
     left, right = axes[0]
     left.plot(number, strong[0] / strong, "o-", color=style.colour(0), label="same batch")
     left.plot(number, number * weak[0] / weak, "s--", color=style.colour(1), label="batch a rank")
@@ -199,9 +199,9 @@ def parallel_figure(accuracy: Results) -> "style.Figure":
     left.set_xticks(number, [str(n) for n in number])
     left.set(xlabel="ranks (–)", ylabel="speed-up (–)")
     style.key(left)
-    lost = accuracy["lost_seconds"].to_numpy()
+    lost = accuracy["lost_seconds"].values
     right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.colour("sky"))
-    right.set_yticks(np.arange(len(lost)), [str(x) for x in accuracy["loss"].to_numpy()])
+    right.set_yticks(np.arange(len(lost)), accuracy.texts("loss"))
     right.set(xlabel="lost (core-seconds)", ylabel="time lost to (what)")
     _foot(figure, accuracy, f"{accuracy.attrs.get('batch', '')}.")
     return figure
@@ -212,10 +212,10 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
     figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
     top, bottom = axes[:, 0]
-    tolerance, seconds = accuracy["tolerance"].to_numpy(), accuracy["spent_seconds"].to_numpy()
-    model = accuracy["spent_model"].to_numpy()
+    tolerance, seconds = accuracy["tolerance"].values, accuracy["spent_seconds"].values
+    model = accuracy["spent_model"].values
     model = np.where(model > 0.0, model, np.nan)
-    best = float(accuracy["cheapest_tolerance"][np.abs(accuracy["aim"].to_numpy() - AIM).argmin()])
+    best = float(accuracy["cheapest_tolerance"][np.abs(accuracy["aim"].values - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
         if rtol == best:
             top.loglog(
@@ -223,14 +223,14 @@ def spending_figure(accuracy: Results) -> "style.Figure":
             )
         look = {**style.look(k), "ms": 2.8}
         top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
-        top.plot(seconds[k], accuracy["spent_error"].to_numpy()[k], **{**look, "ls": "none"})
+        top.plot(seconds[k], accuracy["spent_error"].values[k], **{**look, "ls": "none"})
         top.plot([], [], label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""), **look)
     top.plot(
         accuracy["cheapest_seconds"], accuracy["aim"], ls="none", marker="*", ms=6.0, color=style.colour("ink"),
         mfc=style.colour("paper"), label="cheapest to an error",
     )  # fmt: skip
     top.set(xlabel="core time, spin-up included (s)", ylabel="relative error of $f$ (–)")
-    bias, doubt = (accuracy[name].to_numpy() for name in ("tolerance_bias", "tolerance_bias_error"))
+    bias, doubt = (accuracy[name].values for name in ("tolerance_bias", "tolerance_bias_error"))
     bottom.errorbar(
         tolerance, np.abs(bias), 2.0 * doubt, ls="none", marker="o", ms=2.8, elinewidth=0.6,
         color=style.colour(0),

@@ -63,7 +63,7 @@ def animate(
 
 def _pictures(shown: Results, count: int) -> Iterator[Array]:
     """Frames (height, width, 3), bytes, evenly spaced in time."""
-    time = shown["time"].to_numpy()
+    time = shown["time"].values
     at = np.linspace(time[0], time[-1], count, endpoint=False)
     nearest = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
     figure, movable = _scene(shown)
@@ -82,7 +82,7 @@ def _scene(shown: Results) -> "tuple[style.Figure, Any]":
     with style.matplotlib().rc_context({**style.RC, "backend": "agg"}):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-        forces = shown["contact_force"].to_numpy()
+        forces = shown["contact_force"].values
         pressed = forces.shape[1] > 0 and bool((forces > 0.0).any())
         ratio = [2.2, 1.0] if pressed else [1.0]
         figure, axes = style.grid(len(ratio), 1, 100.0 if pressed else 70.0, height_ratios=ratio)

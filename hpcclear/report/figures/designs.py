@@ -28,7 +28,7 @@ def front_figure(front: Results, verification: Results | None = None) -> "style.
     verification : xarray.Dataset, optional
         Kind ``verification``: its designs are drawn with confidence intervals, joined to what the surrogate said.
     """
-    cases = [str(case) for case in front["case"].to_numpy()]
+    cases = front.texts("case")
     asked = {case: _goals(front.sel(case=case)) for case in cases}
     pairs = [(case, x, y) for case in cases for x, y in itertools.combinations(asked[case], 2)]
     alike = all(x.label == pairs[0][1].label for _, x, _ in pairs)
@@ -86,7 +86,7 @@ def searched(one: Results) -> dict[str, tuple[str, str]]:
     """Words and unit of what a case makes small, from its part of the fronts (kind ``front``), by the variable; none where that
     is mean and standard deviation."""
     names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
-    every = {n: (str(one[f"{n}_goal"].item()), str(one[f"{n}_unit"].item())) for n in names}
+    every = {n: (one.text(f"{n}_goal"), one.text(f"{n}_unit")) for n in names}
     return {name: row for name, row in every.items() if row[0]}
 
 
@@ -106,7 +106,7 @@ def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:
 
 def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
-    for k, run in enumerate(one["run"].to_numpy()):
+    for k, run in enumerate(one["run"].values):
         row = one.sel(run=run)
         points = [goal.scale(row[goal.searched]) for goal in (x, y)]
         panel.plot(
@@ -122,9 +122,7 @@ def _verified(
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
     for one in each(verification, "design"):
         label, marker = _mark(one)
-        if ("case" in one and str(one["case"].item()) != case) or not (
-            all_designs or marker == "o"
-        ):
+        if ("case" in one and one.text("case") != case) or not (all_designs or marker == "o"):
             continue
         at = _place(one, x, y, "true")
         bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
@@ -153,7 +151,7 @@ def _ends(
     """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
-    names = [str(name) for name in verification["design"].to_numpy()]
+    names = verification.texts("design")
     sides = _SIDES if count > 2 else _SIDES[:1] * count
     if count > 2:
         panel.margins(0.15)  # room for letters beside marks at the border
@@ -178,7 +176,7 @@ def _mark(one: Results) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
         return "paper (simulated)", "D"
-    if str(one["design"].item()).rpartition(" ")[2] == "original":
+    if one.text("design").rpartition(" ")[2] == "original":
         return "baseline (simulated)", "s"
     return "optimised (simulated)", "o"
 
@@ -214,7 +212,7 @@ def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
     figure, axes = style.grid(len(quantities), 1, 24.0 + 33.0 * len(quantities), sharex=True)
     for panel, (name, joint, words) in zip(axes[:, 0], quantities, strict=True):
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
-        largest = [float(np.nanmax(abs(one.to_numpy()))) for one in series.values()]
+        largest = [float(np.nanmax(abs(one.values))) for one in series.values()]
         unit = labels.scale(str(series[order[0]].attrs["units"]), largest)
         for k, design in enumerate(order):
             turn = motion.turns(shown[design])

@@ -19,8 +19,8 @@ CONFIDENCE = 0.95
 
 def named(content: Results, variant: int) -> list[str]:
     """Names of the effects that are off in a variant."""
-    off = content["off"].to_numpy()[variant].astype(bool)
-    return [str(name) for name in content["effect"].to_numpy()[off]]
+    off = content["off"].values[variant].astype(bool)
+    return [str(name) for name in content["effect"].values[off]]
 
 
 def label(names: list[str]) -> str:
@@ -95,14 +95,14 @@ def undecided(content: Results, variant: int) -> str:
     one, tolerance = content.isel(variant=variant), float(content.attrs["tolerance"])
     if int(one["decision"]) != Verdict.UNDECIDED:
         return ""
-    open_ = (one["judged"].to_numpy() == 1) & (one["finding"].to_numpy() == Verdict.UNDECIDED)
-    room = tolerance - np.abs(one["change"].to_numpy()[open_])
+    open_ = (one["judged"].values == 1) & (one["finding"].values == Verdict.UNDECIDED)
+    room = tolerance - np.abs(one["change"].values[open_])
     name, count = label(named(content, variant)), int(one["samples"])
     if np.isnan(room).any():
         return f"{name}: undecided, {int(one['failed'])} of {count} samples failed."
     if room.min() <= 0.0:
         return f"{name}: undecided with {count} samples."
-    more = count * float((one["limit"].to_numpy()[open_] / room).max()) ** 2
+    more = count * float((one["limit"].values[open_] / room).max()) ** 2
     more = float(f"{more:.1g}")
     return f"{name}: undecided with {count} samples, about {more:.0f} would suffice."
 
@@ -110,7 +110,7 @@ def undecided(content: Results, variant: int) -> str:
 def statements(content: Results, seconds: Times) -> list[str]:
     """A sentence for what is undecided, for pairs that are more than their sum, and for what may be left out."""
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
-    chosen = int(np.argmax(content["recommended"].to_numpy()))
+    chosen = int(np.argmax(content["recommended"].values))
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
     last = f"No effect can be neglected within {tolerance}."
     if chosen:
@@ -125,7 +125,7 @@ def statements(content: Results, seconds: Times) -> list[str]:
 
 def distinguished(content: Results) -> list[str]:
     """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
-    off = content["off"].to_numpy()
+    off = content["off"].values
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
     found = []
     for k, row in enumerate(off):
@@ -133,8 +133,8 @@ def distinguished(content: Results) -> list[str]:
         if len(parts) != 2 or any(p not in single for p in parts):
             continue
         rows = [k, *(single[p] for p in parts)]
-        change = content["change"].to_numpy()[rows, 0]
-        limit = np.sqrt((content["limit"].to_numpy()[rows, 0] ** 2).sum())
+        change = content["change"].values[rows, 0]
+        limit = np.sqrt((content["limit"].values[rows, 0] ** 2).sum())
         more = change[0] - change[1:].sum()
         if abs(more) > limit:
             found.append(
@@ -150,13 +150,13 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
 
     Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
     """
-    off = effects["off"].to_numpy()
+    off = effects["off"].values
     seconds = seconds_of(timing)
     rows = [k for k in range(1, len(off)) if off[k].sum() == 1]
-    chosen = int(np.argmax(effects["recommended"].to_numpy()))
+    chosen = int(np.argmax(effects["recommended"].values))
     rows += [chosen] if chosen not in (0, *rows) else []
     figure, axes = style.grid(1, 2, 22.0 + 7.0 * len(rows), sharey=True, width_ratios=(3, 2))
-    change, limit = (100 * effects[name].to_numpy()[rows, 0] for name in ("change", "limit"))
+    change, limit = (100 * effects[name].values[rows, 0] for name in ("change", "limit"))
     colours = ("green", "vermilion", "grey")  # by `Verdict`
     places = np.arange(len(rows))[::-1]
     floor = 10.0 ** np.floor(np.log10(10.0 * float(effects.attrs["tolerance"])))

@@ -13,15 +13,15 @@ LOW = 0.9
 
 def of_surfaces(sensitivity: Results) -> dict[str, float]:
     """Return R2 of each response surface over the whole interval, at the clearance where it is least (kind ``sensitivity``)."""
-    widest = sensitivity["r2"].isel(interval=int(np.argmax(sensitivity["interval"].to_numpy())))
-    surfaces = sensitivity["surface"].to_numpy()
-    return {str(k): float(one.min()) for k, one in zip(surfaces, widest.to_numpy(), strict=True)}
+    widest = sensitivity["r2"].isel(interval=int(np.argmax(sensitivity["interval"].values)))
+    surfaces = sensitivity["surface"].values
+    return {str(k): float(one.min()) for k, one in zip(surfaces, widest.values, strict=True)}
 
 
 def of_models(kriging: Results) -> dict[str, float]:
     """Return R2 of each Kriging model, of its worst part (kind ``kriging``)."""
-    family = [str(name) for name in kriging["family"].to_numpy()]
-    r2 = kriging["r2"].to_numpy()
+    family = kriging.texts("family")
+    r2 = kriging["r2"].values
     return {name: float(np.min(r2[np.array(family) == name])) for name in dict.fromkeys(family)}
 
 

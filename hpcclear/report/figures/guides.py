@@ -28,10 +28,10 @@ def touches(response: Results) -> list[Touch]:
     Those between two stored instants are missed: store every step, `output.instants_per_revolution` = 0. A law of impacts
     begins a step at each impact, so that its instant is exact then.
     """
-    time, turn = response["time"].to_numpy(), motion.turns(response)
-    depth = response["penetration"].to_numpy() > 0.0
+    time, turn = response["time"].values, motion.turns(response)
+    depth = response["penetration"].values > 0.0
     found = []
-    for column, label in zip(depth.T, response["joint"].to_numpy(), strict=True):
+    for column, label in zip(depth.T, response["joint"].values, strict=True):
         for k in np.flatnonzero(column[1:] & ~column[:-1]) + 1:
             found.append(Touch(float(time[k]), float(turn[k]), str(label)))
     return sorted(found)
@@ -53,7 +53,7 @@ def guide_figure(response: Results) -> "style.Figure":
             "Give a slide a clearance, length, height and corner_radius",
         )  # fmt: skip
     shown = motion.latest(response)
-    turn, guides = motion.turns(shown), [str(name) for name in shown["guide"].to_numpy()]
+    turn, guides = motion.turns(shown), shown.texts("guide")
     figure, axes = style.grid(3, 1, 110.0, sharex=True)
     for panel, name in zip(axes[:2, 0], ("guide_offset", "guide_tilt"), strict=True):
         unit = labels.of(shown[name])
@@ -71,9 +71,9 @@ def guide_figure(response: Results) -> "style.Figure":
 
 def _corners(panel: "style.Axes", shown: Results, turn: Array) -> None:
     """A row for each corner, filled while it touches, with a tick where a contact begins."""
-    rows = [str(label) for label in shown["joint"].to_numpy() if "." in str(label)]
+    rows = [str(label) for label in shown["joint"].values if "." in str(label)]
     for row, label in enumerate(rows):
-        depth = shown["penetration"].sel(joint=label).to_numpy()
+        depth = shown["penetration"].sel(joint=label).values
         colour = style.colour(row)
         panel.fill_between(
             turn, row - 0.3, row + 0.3, where=depth > 0.0, color=colour, alpha=0.5, lw=0.0

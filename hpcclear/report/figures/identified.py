@@ -32,18 +32,18 @@ def posterior_figure(identify: Results) -> "style.Figure":
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
         low, high = (float(identify[f"prior_{end}"][u]) for end in ("lower", "upper"))
-        scale = labels.scale(str(identify["unit"].to_numpy()[u]), [low, high])
+        scale = labels.scale(str(identify["unit"].values[u]), [low, high])
         edges = np.linspace(low, high, BINS + 1)
-        for k, record in enumerate(identify["record"].to_numpy()):
+        for k, record in enumerate(identify["record"].values):
             colour = style.colour(k)
-            values = identify["posterior"].to_numpy()[k, :, u]
+            values = identify["posterior"].values[k, :, u]
             density = np.histogram(values, edges)[0] / (len(values) * np.diff(edges) * scale.factor)
             panel.stairs(density, scale(edges), color=colour, label=labels.literal(str(record)))
-            ends = scale(identify["interval"].to_numpy()[k, u])
+            ends = scale(identify["interval"].values[k, u])
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
         panel.set(
-            xlabel=scale.label(labels.entry(str(identify["unknown"].to_numpy()[u]))),
+            xlabel=scale.label(labels.entry(str(identify["unknown"].values[u]))),
             ylabel=f"density (1/{scale.unit})",
         )
         style.key(panel, "upper right")
@@ -61,15 +61,15 @@ def features_figure(identify: Results) -> "style.Figure":
     """
     _check(identify)
     last = identify.isel(record=-1)
-    measured, predicted = last["measured"].to_numpy(), last["predicted"].to_numpy()
-    score = (measured - predicted) / last["predicted_deviation"].to_numpy()
+    measured, predicted = last["measured"].values, last["predicted"].values
+    score = (measured - predicted) / last["predicted_deviation"].values
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
     words = "two standard deviations"
     panel.axhspan(-2.0, 2.0, color=style.colour("sky"), alpha=0.3, lw=0, label=words)
     panel.plot(np.arange(len(score)), score, "o", color=style.colour("blue"))
     worst = int(last["worst_feature"])
-    name = str(last["feature"].to_numpy()[worst])
+    name = str(last["feature"].values[worst])
     panel.plot(worst, score[worst], "s", color=style.colour("vermilion"), label=name)
     panel.set(xlabel="number of the feature (–)", ylabel="standard score (–)")
     style.key(panel)
@@ -93,12 +93,12 @@ def growth_figure(identify: Results) -> "style.Figure":
             "growth needs two records with dates",
             "Give a --signal and a --date for each",
         )
-    count, days = identify.sizes["unknown"], identify["elapsed"].to_numpy() / DAY
+    count, days = identify.sizes["unknown"], identify["elapsed"].values / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
-        unit = str(identify["unit"].to_numpy()[u])
-        good = identify["explained"].to_numpy() != 0
-        low, middle, high = (identify["interval"].to_numpy()[:, u, k] for k in range(3))
+        unit = str(identify["unit"].values[u])
+        good = identify["explained"].values != 0
+        low, middle, high = (identify["interval"].values[:, u, k] for k in range(3))
         scale = labels.scale(unit, high)
         panel.errorbar(
             days, scale(middle), scale([middle - low, high - middle]), fmt="o",
@@ -112,7 +112,7 @@ def growth_figure(identify: Results) -> "style.Figure":
             panel.axhline(limit, color=style.colour("orange"), ls="--", label="limit")
         panel.set(
             xlabel="time since the first record (days)",
-            ylabel=scale.label(labels.entry(str(identify["unknown"].to_numpy()[u]))),
+            ylabel=scale.label(labels.entry(str(identify["unknown"].values[u]))),
         )
         style.key(panel)
     return figure

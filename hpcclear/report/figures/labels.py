@@ -190,7 +190,7 @@ def between(low: float, high: float, units: str) -> str:
 
 def of(variable: Variable) -> Scale:
     """The scale of a variable of a dataset."""
-    return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())
+    return scale(str(variable.attrs.get("units", "1")), variable.values)
 
 
 def words(variable: Variable) -> str:

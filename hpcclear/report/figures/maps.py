@@ -42,15 +42,15 @@ def entry(variable: Variable) -> tuple[Array, str]:
 
 
 def _plane(cells: Results, names: list[str]) -> "style.Figure":
-    attractors = cells["attractors"].to_numpy().T if "attractors" in cells else np.zeros(1)
+    attractors = cells["attractors"].values.T if "attractors" in cells else np.zeros(1)
     most = int(np.nanmax(np.nan_to_num(attractors)))
     count = 3 + (most > 1)
     figure, axes = style.side_by_side(count, 10.0 / count + 55.0, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
-    exponent = cells["lyapunov_exponent"].to_numpy().T
+    exponent = cells["lyapunov_exponent"].values.T
     finite = np.abs(exponent[np.isfinite(exponent)])
     reach = float(np.quantile(finite, 0.98)) if finite.size else 1.0
-    regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan).T
+    regime = np.where(cells["status"].values == Status.OK, cells["regime"].values, np.nan).T
     spans = [(int(low + 0.5), int(high - 0.5)) for low, high in itertools.pairwise(_PERIODS)]
     orders = [f"{a}" if a == b else f"{a} to {b}" for a, b in spans]
     steps = style.matplotlib().colors.BoundaryNorm(_PERIODS, 256)
@@ -59,7 +59,7 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
     numbers = [str(k + 1) for k in range(most)]
     panels: list[tuple[str, Array, style.Look, list[float], list[str]]] = [
         (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}, [], []),
-        (_PERIOD, cells["period"].to_numpy().T, {"norm": steps}, middles, orders),
+        (_PERIOD, cells["period"].values.T, {"norm": steps}, middles, orders),
         ("regime", regime - 1.0, _categorical(kinds), [*map(float, range(len(kinds)))], kinds),
         ("motions reached", attractors - 1.0, _categorical(numbers), [*map(float, range(most))], numbers),
     ]  # fmt: skip
@@ -92,14 +92,14 @@ def _line(cells: Results, name: str) -> "style.Figure":
         (axes[0, 0], "lyapunov_exponent", "lyapunov_exponent_limit", 1.0, _EXPONENT),
         (axes[3, 0], "objective", "objective_limit", unit.factor, unit.label("$f$, 95 % CI")),
     ):
-        values, width = (cells[one].to_numpy() * factor for one in (key, reach))
+        values, width = (cells[one].values * factor for one in (key, reach))
         panel.errorbar(x, values, width, fmt="o", ms=2.0, lw=0.7, color=style.colour("blue"))
         panel.set_ylabel(words)
     axes[0, 0].axhline(0.0, color=style.colour("grey"), lw=0.6)
-    axes[1, 0].plot(x, cells["period"].to_numpy(), "s", ms=2.0, color=style.colour("vermilion"))
+    axes[1, 0].plot(x, cells["period"].values, "s", ms=2.0, color=style.colour("vermilion"))
     axes[1, 0].set_ylabel("period (revolutions)")
-    regime = cells["regime"].to_numpy().astype(float)
-    regime[(cells["status"].to_numpy() != Status.OK) | (regime == Regime.UNJUDGED)] = np.nan
+    regime = cells["regime"].values.astype(float)
+    regime[(cells["status"].values != Status.OK) | (regime == Regime.UNJUDGED)] = np.nan
     axes[2, 0].plot(x, regime, "D", ms=2.0, color=style.colour("green"))
     axes[2, 0].set_yticks([int(one) for one in _REGIMES], [one.name.lower() for one in _REGIMES])
     axes[2, 0].set_ylim(0.5, len(_REGIMES) + 0.5)

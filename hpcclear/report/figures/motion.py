@@ -15,8 +15,8 @@ def phase(response: Results) -> Array:
     """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
     way it turns."""
     if "drive_phase" in response:
-        return response["drive_phase"].to_numpy()
-    angle = response["crank_angle"].to_numpy()
+        return response["drive_phase"].values
+    angle = response["crank_angle"].values
     return -angle if angle[-1] < angle[0] else angle
 
 
@@ -32,7 +32,7 @@ def turns_label(response: Results) -> str:
 
 def crank_angle(response: Results) -> tuple[Array, int]:
     """Crank angle times its sense (time,), rad, which rises, and the sense, -1 clockwise; of a drive that swings its phase."""
-    angle, gone = response["crank_angle"].to_numpy(), phase(response)
+    angle, gone = response["crank_angle"].values, phase(response)
     sense = -1 if angle[-1] < angle[0] else 1
     # a body that a torque drives may be thrown back a little; one that swings gains nothing
     if "drive_phase" in response and abs(angle[-1] - angle[0]) < 0.5 * (gone[-1] - gone[0]):
@@ -92,12 +92,12 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
 
 def joints(response: Results) -> dict[str, str]:
     """Names of the joints of a response, by label."""
-    return {str(label): str(label) for label in response["joint"].to_numpy()}
+    return {str(label): str(label) for label in response["joint"].values}
 
 
 def pins(response: Results) -> list[str]:
     """Labels of the joints of a response that are no corners of sliders in guides."""
-    return [str(label) for label in response["joint"].to_numpy() if "." not in str(label)]
+    return [str(label) for label in response["joint"].values if "." not in str(label)]
 
 
 def of_pins(response: Results) -> Results:
@@ -126,10 +126,10 @@ def followed(response: Results) -> tuple[Variable, Variable]:
         return response["slider_position"], response["slider_velocity"]
     last = response.isel(body=-1)
     word, speed = "angle", last["body_spin"]
-    if not speed.to_numpy().any():
-        word = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].to_numpy())))
+    if not speed.values.any():
+        word = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].values)))
         speed = last[f"body_v{word}"]
-    name, place = str(last["body"].item()), last[f"body_{word}"]
+    name, place = last.text("body"), last[f"body_{word}"]
     place.attrs["long_name"], speed.attrs["long_name"] = f"{word} of {name}", f"speed of {name}"
     return place, speed
 
@@ -137,7 +137,7 @@ def followed(response: Results) -> tuple[Variable, Variable]:
 def clearances(response: Results) -> Array:
     """Radial clearance of each pin, m, shape (joints,); NaN where there is none, or where it was never reached."""
     found = reaches(response)
-    found[~np.isin(response["joint"].to_numpy(), pins(response))] = np.nan
+    found[~np.isin(response["joint"].values, pins(response))] = np.nan
     return found
 
 
@@ -147,7 +147,7 @@ def reaches(response: Results) -> Array:
     Penetration is |e| less that, so it follows from contact: the radial clearance of a pin.
     """
     reach = eccentricity(response)
-    depth = response["penetration"].to_numpy()
+    depth = response["penetration"].values
     found = np.full(depth.shape[1], np.nan)
     for joint in range(depth.shape[1]):
         contact = depth[:, joint] > 0.0
@@ -158,10 +158,10 @@ def reaches(response: Results) -> Array:
 
 def contact(response: Results, joint: str) -> str:
     """Return how long a joint is in contact, in words: a share of the time, never rounded to 0 or 1."""
-    touching = response["penetration"].sel(joint=joint).to_numpy() > 0.0
+    touching = response["penetration"].sel(joint=joint).values > 0.0
     if touching.all() or not touching.any():
         return f"in {'contact' if touching.all() else 'flight'} at all instants stored"
-    time = response["time"].to_numpy()
+    time = response["time"].values
     weight = np.gradient(time) if len(time) > 1 else np.ones(1)
     share = float(weight @ touching / weight.sum())
     shown = "> 99.9" if share > 0.999 else "< 0.1" if share < 0.001 else f"{100.0 * share:.1f}"
@@ -170,12 +170,12 @@ def contact(response: Results, joint: str) -> str:
 
 def eccentricity(response: Results) -> Array:
     """Distance of journal centre and bearing centre, m, shape (time, 2)."""
-    return np.hypot(response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy())
+    return np.hypot(response["eccentricity_x"].values, response["eccentricity_y"].values)
 
 
 def objective_by_turn(response: Results) -> Array:
     """Objective f of every whole revolution, m, shape (revolutions,): time means over the instants of the file."""
-    time, angle = response["time"].to_numpy(), turns(response)
+    time, angle = response["time"].values, turns(response)
     first, last = _passages(response)
     borders = np.arange(first, last + 1)
     gap = np.abs(eccentricity(response) - reaches(response))

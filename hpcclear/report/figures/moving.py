@@ -20,7 +20,7 @@ def bodies(shown: Results) -> Drawn:
 
 def eccentricities(shown: Results) -> Array:
     """Return journal centres from bearing centres, m, shape (t, joints, 2)."""
-    both = [shown[f"eccentricity_{axis}"].to_numpy() for axis in "xy"]
+    both = [shown[f"eccentricity_{axis}"].values for axis in "xy"]
     return np.stack(both, axis=-1)
 
 
@@ -41,10 +41,10 @@ def poses(scene: Scene, shown: Results, k: int) -> dict[str, Pose]:
     if "rod_x" not in shown:
         held = [one.isel(body=b) for b in range(shown.sizes["body"])]
         entries = ("body_x", "body_y", "body_angle")
-        return {str(b["body"].item()): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
+        return {b.text("body"): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
     phi, crank = float(one["crank_angle"]), scene.linkage.bodies[0].own_center[0]
     aside, tilt = (
-        float(one[name].to_numpy()[0]) if name in shown else 0.0
+        float(one[name].values[0]) if name in shown else 0.0
         for name in ("guide_offset", "guide_tilt")
     )
     height = aside + float(getattr(scene.mechanism, "offset", None) or 0.0)
@@ -62,10 +62,10 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths. So does the
     height of the slider, from the rod's other end.
     """
-    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
-    phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
+    rod = np.column_stack([shown["rod_x"].values, shown["rod_y"].values])
+    phi, theta = shown["crank_angle"].values, shown["rod_angle"].values
     crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
-    names = [str(label) for label in shown["joint"].to_numpy()]
+    names = shown.texts("joint")
     near_pin, far_pin = (
         e[:, names.index(name)] if name in names else np.zeros_like(rod) for name in JOINTS
     )
@@ -75,10 +75,10 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     far = (
         rod + far_pin
     )  # from here along the rod to the slider's pin, which stays at one height but for clearance
-    slides = shown["slider_position"].to_numpy()
+    slides = shown["slider_position"].values
     length = float((slides - far[:, 0]) @ along[:, 0] / (along[:, 0] @ along[:, 0]))
     aside, tilt = (
-        shown[name].to_numpy()[:, 0] if name in shown else np.zeros_like(phi)
+        shown[name].values[:, 0] if name in shown else np.zeros_like(phi)
         for name in ("guide_offset", "guide_tilt")
     )
     height = float(np.mean(far[:, 1] + length * along[:, 1] - aside))
@@ -88,12 +88,9 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
 
 
 def _linkage(shown: Results) -> Drawn:
-    names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
-    bodies = [
-        [k for k, name in enumerate(names) if name == body]
-        for body in map(str, shown["body"].to_numpy())
-    ]
-    points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
-    angles = shown["body_angle"].to_numpy()
+    names = [str(point).partition(".")[0] for point in shown["point"].values]
+    bodies = [[k for k, name in enumerate(names) if name == body] for body in shown.texts("body")]
+    points = np.stack([shown["point_x"].values, shown["point_y"].values], axis=-1)
+    angles = shown["body_angle"].values
     # without the whole turns before, which would cost digits
     return bodies, points, angles - motion.TURN * np.floor(angles[0] / motion.TURN)

@@ -37,7 +37,7 @@ def noise_figure(response: Results) -> "style.Figure":
         axes[1, 0].loglog(orders.labels["order"], unit(orders), color=colour, lw=0.7, label=name)
     axes[0, 0].set(xscale="log", ylabel="level (dB re 1 µN)", title="third octaves")
     axes[0, 0].set_ylim(bottom=highest - FALL)
-    bands = response["band"].to_numpy()[::3]
+    bands = response["band"].values[::3]
     axes[0, 0].set_xticks(bands, [band_name(one) for one in bands], rotation=45.0)
     axes[0, 0].minorticks_off()
     style.key(axes[0, 0], "lower right")
@@ -51,11 +51,11 @@ def _levels(
 ) -> None:
     """A line with its interval; an end at nothing is at the bottom."""
     level, lower, upper = ends
-    there = np.isfinite(level.to_numpy())
+    there = np.isfinite(level.values)
     band = level.labels["band"][there]
-    panel.plot(band, level.to_numpy()[there], "o-", ms=2.5, lw=0.8, color=colour, label=name)
-    least = np.nan_to_num(lower.to_numpy()[there], nan=np.nan, neginf=-1e3)
-    panel.fill_between(band, least, upper.to_numpy()[there], color=colour, alpha=0.25, lw=0.0)
+    panel.plot(band, level.values[there], "o-", ms=2.5, lw=0.8, color=colour, label=name)
+    least = np.nan_to_num(lower.values[there], nan=np.nan, neginf=-1e3)
+    panel.fill_between(band, least, upper.values[there], color=colour, alpha=0.25, lw=0.0)
 
 
 def _forces(response: Results) -> dict[str, tuple[Variable, Variable, Variable, Variable]]:
@@ -64,7 +64,7 @@ def _forces(response: Results) -> dict[str, tuple[Variable, Variable, Variable, 
     found = {}
     if "frame_force_level" in response:
         found["force on the frame"] = tuple(response[f"frame_force_{end}"] for end in ends)
-    for joint in map(str, response["joint"].to_numpy()):
+    for joint in response.texts("joint"):
         own = tuple(response[f"contact_force_{end}"].sel(joint=joint) for end in ends)
         if float(np.max(own[-1])) > 0.0:
             found[joint.replace("_", " ")] = own

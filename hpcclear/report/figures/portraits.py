@@ -22,7 +22,7 @@ def orbit_figure(response: Results) -> "style.Figure":
     clearances = unit(motion.clearances(shown))
     for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):
         x, y = (unit(shown[f"eccentricity_{c}"].sel(joint=joint)) for c in "xy")
-        contact = shown["penetration"].sel(joint=joint).to_numpy() > 0.0
+        contact = shown["penetration"].sel(joint=joint).values > 0.0
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
         look: style.Look = {"color": style.colour("sky"), "lw": 0.7, "label": "free flight"}
         panel.plot(*_flight(x, y, _rolls(angle, contact)), **look)
@@ -52,7 +52,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
     angle, sense = motion.crank_angle(shown)
     turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
-        x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() for c in "xy")
+        x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).values for c in "xy")
         radius = force(shown["contact_force"].sel(joint=joint))
         contact = radius > 0.0
         colour = np.mod(turn, 1.0)[contact] * 360.0

@@ -67,8 +67,8 @@ def energy_figure(response: Results) -> "style.Figure":
         "stored": ("kinetic_energy", "elastic_energy", "potential_energy"),
     }
     for panel, (kind, names) in zip(axes[:2, 0], balances.items(), strict=True):
-        present = [n for n in names if n in response and response[n].to_numpy().any()]
-        unit = labels.scale("J", [float(abs(response[n].to_numpy()).max()) for n in present])
+        present = [n for n in names if n in response and response[n].values.any()]
+        unit = labels.scale("J", [float(abs(response[n].values).max()) for n in present])
         for row, name in enumerate(present):
             label = name.replace("_", " ").removesuffix(" energy")
             look = {**style.look(row), "marker": ""}
@@ -76,7 +76,7 @@ def energy_figure(response: Results) -> "style.Figure":
         panel.set_ylabel(unit.label(f"energy {kind}"))
         if present:  # a response that failed at once has none
             style.key(panel, "above", borderaxespad=0.1)
-    residual = abs(response["energy_residual"].to_numpy())
+    residual = abs(response["energy_residual"].values)
     unit = labels.scale("J", residual)
     axes[2, 0].plot(turn, residual * unit.factor, color=style.colour("ink"), lw=0.7)
     if (residual > 0.0).any():

@@ -67,7 +67,7 @@ def _spread(below: "style.Axes", samples: Results, main: Variable) -> None:
     """How f scatters between revolutions, where that is known."""
     spread = samples["objective_spread"]
     below.set_xlabel(labels.of(main).label(labels.axis(main)))
-    values = spread.to_numpy()
+    values = spread.values
     if np.isnan(values).all() and not np.isnan(samples["objective"]).all():
         below.set_yticks([])
         words = "cycle-to-cycle variation\nnot available for this objective"
@@ -122,7 +122,7 @@ def binned(x: Array, y: Array) -> tuple[Array, Array]:
 def _title(samples: Results) -> str:
     count = samples.sizes["sample"]
     failed = int(np.count_nonzero(samples["status"]))
-    latched = int(samples["latched"].to_numpy().any(axis=1).sum()) if "latched" in samples else 0
+    latched = int(samples["latched"].values.any(axis=1).sum()) if "latched" in samples else 0
     return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"
 
 

@@ -21,7 +21,7 @@ def sensitivity_figure(sensitivity: Results) -> "style.Figure":
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
     changing and is determined, with its uncertainty.
     """
-    surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
+    surfaces = sensitivity.texts("surface")
     rows = (len(surfaces) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True, sharey=True)
     unit = labels.of(sensitivity["sensitivity"])
@@ -40,9 +40,9 @@ def sensitivity_figure(sensitivity: Results) -> "style.Figure":
 def _sensitivity_panel(
     axes: "style.Axes", surface: Results, across: labels.Scale, unit: labels.Scale
 ) -> None:
-    widest = surface.isel(interval=int(np.argmax(surface["interval"].to_numpy())))
+    widest = surface.isel(interval=int(np.argmax(surface["interval"].values)))
     clearance, row = across(surface["clearance"]), 0
-    for parameter in surface["parameter"].to_numpy():
+    for parameter in surface["parameter"].values:
         one = widest.sel(parameter=parameter)
         slope, error = unit(one["sensitivity"]), 2.0 * unit(one["standard_error"])
         if not np.isfinite(slope).any():
@@ -54,7 +54,7 @@ def _sensitivity_panel(
         axes.plot(clearance, slope, label=symbol(str(parameter)), **{**look, "marker": ""})
         if "best_sensitivity" in surface:
             best = surface.sel(parameter=parameter)
-            where = best["converged"].to_numpy() != 0
+            where = best["converged"].values != 0
             y, bar = (unit(best[name])[where] for name in ("best_sensitivity", "uncertainty"))
             marks = {**look, "ls": "none", "ms": 2.6, "elinewidth": 0.7}
             axes.errorbar(clearance[where], y, yerr=2.0 * bar, **marks)
@@ -67,18 +67,18 @@ def _sensitivity_panel(
 @style.drawn
 def fit_figure(sensitivity: Results) -> "style.Figure":
     """Fit of the response surfaces (kind ``sensitivity``) against clearance, a curve for each interval (the paper's Fig. 7)."""
-    surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
+    surfaces = sensitivity.texts("surface")
     figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
     across = labels.of(sensitivity["clearance"])
     clearance = across(sensitivity["clearance"])
-    intervals = sensitivity["interval"].to_numpy()
+    intervals = sensitivity["interval"].values
     colours = style.matplotlib().colormaps[style.matplotlib().rcParams["image.cmap"]](
         np.linspace(0.0, 0.9, len(intervals))
     )
     for line, surface in zip(axes, surfaces, strict=True):
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
-                values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
+                values = sensitivity[name].sel(surface=surface).isel(interval=k).values
                 look = {**style.look(k), "color": colours[k], "ls": "-", "ms": 2.2, "lw": 0.7}
                 panel.plot(clearance, values, label=f"{100 * interval:.0f} %", **look)
             panel.set_ylabel(label)
@@ -110,15 +110,15 @@ def sobol_figure(sensitivity: Results) -> "style.Figure":
         reason = "the study did not compute Sobol indices"
         remedy = "Set it to a power of two and run again"
         raise InputError("sensitivity.sobol_samples", 0, reason, remedy)
-    names = [str(name) for name in sensitivity["parameter"].to_numpy()]
+    names = sensitivity.texts("parameter")
     figure, axes = style.grid(1, 1, 22.0 + 7.0 * len(names))
     panel = axes[0, 0]
-    order = np.argsort(np.nan_to_num(sensitivity["sobol_total"].to_numpy()), kind="stable")
+    order = np.argsort(np.nan_to_num(sensitivity["sobol_total"].values), kind="stable")
     rows = np.arange(len(names))
     kinds = (("first", "first order", "blue", 0.2), ("total", "total", "orange", -0.2))
     for kind, label, colour, shift in kinds:
-        index, name = sensitivity[f"sobol_{kind}"].to_numpy()[order], f"sobol_{kind}_error"
-        error = 2.0 * sensitivity[name].to_numpy()[order] if name in sensitivity else None
+        index, name = sensitivity[f"sobol_{kind}"].values[order], f"sobol_{kind}_error"
+        error = 2.0 * sensitivity[name].values[order] if name in sensitivity else None
         look: style.Look = {"color": style.colour(colour), "label": label, "error_kw": {"lw": 0.7}}
         panel.barh(rows + shift, index, 0.36, xerr=error, **look)
     panel.set_yticks(rows, [symbol(names[k]) for k in order])

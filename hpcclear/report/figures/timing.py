@@ -16,10 +16,10 @@ def timing_figure(timing: Results) -> "style.Figure":
     parts = [("busy", "computing", "blue"), ("compile", "compiling", "orange")]
     parts += [("write", "writing", "green"), ("idle", "waiting", "grey")]
     for panel, along, over in zip(axes[:, 0], ("rank", "stage"), (1, 0), strict=True):
-        names = [labels.literal(str(name)) for name in timing[along].to_numpy()]
+        names = [labels.literal(str(name)) for name in timing[along].values]
         left = np.zeros(len(names))
         for name, label, colour in parts:
-            spent = timing[name].to_numpy().sum(over)
+            spent = timing[name].values.sum(over)
             look: style.Look = {"left": left, "color": style.colour(colour), "label": label}
             panel.barh(np.arange(len(names)), spent, 0.7, **look)
             left += spent

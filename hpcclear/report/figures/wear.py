@@ -12,9 +12,9 @@ from hpcclear.results.content import Results
 def fan_figure(wear: Results) -> "style.Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
     (kind ``wear``)."""
-    joints = [str(name) for name in wear["joint"].to_numpy()]
+    joints = wear.texts("joint")
     figure, axes = style.grid(len(joints) + 1, 1, 30.0 + 45.0 * (len(joints) + 1))
-    cycles = wear["cycle"].to_numpy()
+    cycles = wear["cycle"].values
     rows = [(wear, "objective", "objective $f$")]
     rows[:0] = [(wear.sel(joint=name), "clearance", f"clearance, {name}") for name in joints]
     blue = style.colour("blue")
@@ -49,11 +49,11 @@ def survival_figure(wear: Results) -> "style.Figure":
         reason, remedy = "no limit ends a service life", "Give one, such as clearance"
         raise InputError("wear.limit", None, reason, remedy)
     figure, axes = style.grid(1, 1, 70.0)
-    panel, cycles = axes[0, 0], wear["cycle"].to_numpy()
-    lower, upper = wear["survival_lower"].to_numpy(), wear["survival_upper"].to_numpy()
+    panel, cycles = axes[0, 0], wear["cycle"].values
+    lower, upper = wear["survival_lower"].values, wear["survival_upper"].values
     blue = style.colour("blue")
     panel.fill_between(cycles, lower, upper, color=blue, alpha=0.25, lw=0, label="95 % CI")
-    panel.plot(cycles, wear["survival"].to_numpy(), color=blue, label="survival")
+    panel.plot(cycles, wear["survival"].values, color=blue, label="survival")
     panel.set(xlabel=_revolutions(wear), ylabel="survival (–)", ylim=(-0.02, 1.02))
     style.key(panel, "lower left")
     return figure
@@ -61,7 +61,7 @@ def survival_figure(wear: Results) -> "style.Figure":
 
 def _revolutions(wear: Results) -> str:
     """The label of an axis of revolutions, with the hours they take where every life turns alike."""
-    each = wear["revolution_time"].to_numpy() if "revolution_time" in wear else np.zeros(0)
+    each = wear["revolution_time"].values if "revolution_time" in wear else np.zeros(0)
     if not each.size or np.ptp(each) > 0.0:
         return "revolutions (–)"
     last = float(wear["cycle"][-1])
@@ -87,18 +87,18 @@ def profile_figure(wear: Results) -> "style.Figure":
         )  # fmt: skip
     panels = [
         (str(name), surface, depths)
-        for name in wear["joint"].to_numpy()
+        for name in wear["joint"].values
         for surface in ("bearing", "journal")
         if np.max(depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)) > 0.0
     ]
     ages = np.unique(np.linspace(0, wear.sizes["cycle"] - 1, AGES + 1).round().astype(int))[1:]
     rows = max(-(-len(panels) // 2), 1)
     figure, axes = style.grid(rows, 2, 12.0 + 50.0 * rows, subplot_kw={"projection": "polar"})
-    angle = np.append(wear["angle"].to_numpy(), 2.0 * np.pi)
+    angle = np.append(wear["angle"].values, 2.0 * np.pi)
     for panel in axes.ravel()[len(panels) :]:
         panel.remove()
     for panel, (name, surface, depths) in zip(axes.ravel(), panels, strict=False):
-        scale = labels.scale("m", depths.to_numpy())
+        scale = labels.scale("m", depths.values)
         for shade, age in zip(np.linspace(0.3, 1.0, len(ages)), ages, strict=True):
             value = scale(depths.isel(cycle=age))
             look = {

@@ -45,9 +45,9 @@ class Content:
         return self.responses.get("original", next(iter(self.responses.values()), None))
 
     @property
-    def is_compared(self) -> bool:
-        """Whether values that a publication prints stand beside our designs."""
-        return "mean_paper" in self.files.get("verification", ())
+    def scene(self) -> Scene | None:
+        """The scene of the results; None where that is not known."""
+        return scene_in(self.attribute("scene"))
 
     def attribute(self, name: str) -> str:
         """A global attribute of the first file that has it."""
@@ -114,6 +114,11 @@ def scene_in(text: str) -> Scene | None:
         return _scene(text)
     except InputError:
         return None
+
+
+def scene_of(content: Results) -> Scene | None:
+    """Return the scene that results were made of; None where that is not known."""
+    return scene_in(str(content.attrs.get("scene", "")))
 
 
 @lru_cache(maxsize=4)

@@ -26,11 +26,8 @@ SIMULATED = (
 _WORDS = "By simulation, ± half-width of the 95 % confidence interval. In brackets: the name in verification.nc."
 
 
-def designs(content: Content) -> list[object] | None:
-    """What was found, a table a case with each distinct design once; None without any."""
-    verified = content.get("verification")
-    if verified is None:
-        return None
+def designs(verified: Results, content: Content) -> list[object]:
+    """What was found, a table a case with each distinct design once."""
     shown = beside.roles(verified)
     named = [one.design for each in shown.values() for one in each]
     tables: list[object] = [
@@ -48,7 +45,7 @@ def designs(content: Content) -> list[object] | None:
 
 def names_in(verified: Results) -> list[str]:
     """Return the names of all designs."""
-    return [str(name) for name in verified["design"].to_numpy()]
+    return verified.texts("design")
 
 
 def table_of(
@@ -86,8 +83,8 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
         return []
     cells: list[object] = []
     for name in names:
-        value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
-        words = str(one[f"{name}_goal"].item())
+        value = labels.quantity(float(one[f"{name}_true"]), one.text(f"{name}_unit"))
+        words = one.text(f"{name}_goal")
         cells.append(f"{words}: {value}" if words else "")
     return [*cells, "; ".join(worded(one)) or "none"]
 
@@ -101,4 +98,4 @@ def _cell(one: Results, name: str, scale: labels.Scale) -> str:
     return labels.paired(value, half) if np.isfinite([value, half]).all() else number(value)
 
 
-PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs),)
+PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs, "verification"),)

@@ -124,8 +124,8 @@ def _crank(response: Results) -> list[tuple[str, str]]:
     """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
     if "crank_speed" not in response:
         return []
-    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
-    turns, time = motion.turns(response), response["time"].to_numpy()
+    speed = response["crank_speed"].values * 30.0 / np.pi
+    turns, time = motion.turns(response), response["time"].values
     if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
         return []  # it is prescribed
     ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)

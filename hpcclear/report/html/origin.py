@@ -5,18 +5,28 @@ import json
 import numpy as np
 
 from hpcclear.report.figures import curves, labels
-from hpcclear.report.html.content import Content, scene_in
+from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable, download, number, preformatted
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 
 _PARTS = {"busy": "computing", "idle": "waiting", "compile": "compiling", "write": "writing"}
 """What a rank spends time on, variables of kind ``timing``, in words."""
 
 
+_ITEMS = {
+    "program": "source",
+    "versions": "versions",
+    "processor": "processor",
+    "hash of the scene": "scene_hash",
+    "method of": "references",
+}
+"""Attributes of files that say where they come from, by their words."""
+
+
 def inputs(content: Content) -> list[object] | None:
     """Fits, files and curves of the scene by their names, curves with a small drawing."""
-    text = content.attribute("scene")
-    if (scene := scene_in(text)) is None:
+    if (scene := content.scene) is None:
         return None
     read = {one[0]: one[1:] for one in json.loads(content.attribute("readings") or "[]")}
     rows: list[list[object]] = []
@@ -27,11 +37,8 @@ def inputs(content: Content) -> list[object] | None:
         drawn = {"kind": "curve", "words": words, "points": curves.outline(one)}
         rows.append([labels.entry(one.key), name, drawn])
     rows += [[labels.entry(path), *one] for path, one in read.items()]
-    return (
-        [PageTable(["entry", "as written", "value"], rows, "Fits, files and curves")]
-        if rows
-        else None
-    )
+    header = ["entry", "as written", "value"]
+    return [PageTable(header, rows, "Fits, files and curves")] if rows else None
 
 
 def scene(content: Content) -> list[object] | None:
@@ -40,19 +47,16 @@ def scene(content: Content) -> list[object] | None:
     return [download("scene.toml", text)] if text else None
 
 
-def timing(content: Content) -> list[object] | None:
+def timing(found: Results, content: Content) -> list[object]:
     """How the ranks spent their time, in sentences; the figure of it has each rank."""
-    found = content.get("timing")
-    if found is None:
-        return None
     spent = {word: float(np.sum(found[name])) for name, word in _PARTS.items()}
     total, count = sum(spent.values()) or 1.0, found.sizes["rank"]
-    wall = float(np.sum([found[name].to_numpy().sum(1) for name in _PARTS], axis=0).max())
+    wall = float(np.sum([found[name].values.sum(1) for name in _PARTS], axis=0).max())
     shares = ", ".join(f"{word} {100 * part / total:.0f} %" for word, part in spent.items())
     words = f"{count} {'rank' if count == 1 else 'ranks'}, {number(wall, 3)} s: {shares}."
     rates = []
     if "samples" in found and spent["computing"] > 0.0:
-        simulated = found["samples"].to_numpy()
+        simulated = found["samples"].values
         rate = float(simulated.sum() / found["busy"][simulated > 0].sum())
         rates.append(f"{number(rate, 3)} samples per second and core")
     if (samples := content.get("samples")) is not None:
@@ -65,28 +69,17 @@ def reproduce(content: Content) -> list[object]:
     found = content.get("timing")
     steps: list[object] = []
     if found is not None:
-        steps += ["The command that made these results:"]
-        steps += [preformatted(str(found["command"].item()))]
+        steps += ["The command that made these results:", preformatted(found.text("command"))]
     words = "`hpcclear reproduce` with this directory simulates some results again and compares, bit for bit."
-    rows = [
-        [label, content.attribute(name)]
-        for label, name in (
-            ("program", "source"),
-            ("versions", "versions"),
-            ("processor", "processor"),
-            ("hash of the scene", "scene_hash"),
-            ("method of", "references"),
-        )
-        if content.attribute(name)
-    ]
-    if rows:
-        steps += [words, PageTable(["item", "value"], rows, "Origin of these files")]
-    return steps
+    items = {label: content.attribute(name) for label, name in _ITEMS.items()}
+    rows = [[label, text] for label, text in items.items() if text]
+    table = PageTable(["item", "value"], rows, "Origin of these files")
+    return [*steps, words, table] if rows else steps
 
 
 PARTS = (
     SectionOf(10, "reproduce", "origin", "Versions and command", reproduce, each=True),
     SectionOf(15, "reproduce", "inputs", "Inputs", inputs, each=True),
     SectionOf(20, "reproduce", "scene", "Scene", scene, each=True),
-    SectionOf(30, "reproduce", "time", "Run time of the ranks", timing),
+    SectionOf(30, "reproduce", "time", "Run time of the ranks", timing, "timing"),
 )

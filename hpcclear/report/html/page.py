@@ -151,8 +151,8 @@ def sections(content: Content, troubles: list[str]) -> Iterator[tuple[SectionOf,
     """Yield each section that results have, and its parts; one that cannot be made or shown is named in `troubles`."""
     for part in declared(SectionOf):
 
-        def made(part: SectionOf = part) -> Sequence[object] | None:
-            parts = part.make(content)
+        def made(part: SectionOf = part) -> Sequence[object]:
+            parts = part.parts(content)
             if parts:
                 render("parts.html", parts=parts)  # whether it can be shown
             return parts
@@ -166,9 +166,8 @@ def _subjects(
 ) -> list[Subject]:
     """The folded parts of the page, those with nothing inside left out."""
     found: dict[str, list[tuple[str, str, Sequence[object]]]] = {name: [] for name in SUBJECTS}
-    plain = (
-        replace(content, files={}) if content.samples else content
-    )  # each has sections of its own
+    # each of several samples has sections of its own
+    plain = replace(content, files={}) if content.samples else content
     for part, parts in sections(plain, troubles):
         found[part.subject].append((part.name, part.title, parts))
     for k, (name, one) in enumerate(content.each_of_samples(), 1):
@@ -191,15 +190,11 @@ def _missing(content: Content, troubles: list[str]) -> list[str]:
     alone = len(kinds) == 1 and all(kind not in KINDS or KINDS[kind].alone for kind in kinds)
     if not content.whole or not kinds or alone:
         return troubles  # a directory of that command lacks nothing
-    words = [
-        f"{name}.nc: {kind.absent}"
-        for name, kind in KINDS.items()
-        if kind.absent and content.get(name) is None
-    ]
+    absent = {n: one.absent for n, one in KINDS.items() if one.absent and n not in content.files}
+    words = [f"{name}.nc: {text}" for name, text in absent.items()]
     if not content.responses:
-        words.append(
-            "responses/: no response was stored, so there is no animation (`hpcclear simulate` or `run`)"
-        )
+        why = "no response was stored, so there is no animation (`hpcclear simulate` or `run`)"
+        words.append(f"responses/: {why}")
     return [*troubles, *words]
 
 

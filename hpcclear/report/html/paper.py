@@ -5,9 +5,10 @@ import numpy as np
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.designs import SIMULATED, names_in, table_of
+from hpcclear.report.html.designs import SIMULATED, table_of
 from hpcclear.report.html.markup import PageTable, number
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import each
 
 _BADGES = {
     Verdict.HOLDS: {"words": "✓ holds", "kind": "holds"},
@@ -24,17 +25,13 @@ def readings(content: Content) -> list[object] | None:
     found = content.get("readings")
     if found is None:
         return None
-    far = found["distance"].to_numpy() if "distance" in found else np.array([])
+    far, texts = found["distance"].values if "distance" in found else np.array([]), []
     if not np.isfinite(far).any():
         return None
-    ends = {"nearest": int(np.nanargmin(far)), "farthest": int(np.nanargmax(far))}
-    said = (
-        f"{word} ({number(far[k], 3)}): {found['reading'].to_numpy()[k]}"
-        for word, k in ends.items()
-    )
-    return [
-        f"Of {len(far)} readings of the paper's text, by the root mean square of ln(mean / printed mean): {'; '.join(said)}."
-    ]
+    for word, k in (("nearest", np.nanargmin(far)), ("farthest", np.nanargmax(far))):
+        texts.append(f"{word} ({number(far[k], 3)}): {found['reading'].values[k]}")
+    by = "by the root mean square of ln(mean / printed mean)"
+    return [f"Of {len(far)} readings of the paper's text, {by}: {'; '.join(texts)}."]
 
 
 def claims(content: Content) -> list[object] | None:
@@ -42,14 +39,13 @@ def claims(content: Content) -> list[object] | None:
     found = content.get("claims")
     if found is None:
         return None
-    verdicts = found["verdict"].to_numpy().tolist()
+    verdicts = found["verdict"].values.tolist()
     counts = [verdicts.count(verdict) for verdict in Verdict]
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
-    rows = []
-    for k in range(found.sizes["claim"]):
-        one = found.isel(claim=k)
-        badge = _BADGES[Verdict(int(one["verdict"]))]
-        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge])
+    rows = [
+        [f"{int(one['claim'])}. {one.text('text')}", _BADGES[Verdict(int(one["verdict"]))]]
+        for one in each(found, "claim")
+    ]
     title = "Claims of the paper; claims.nc has the numbers that decide"
     return [held, PageTable(["claim", "verdict"], rows, title)]
 
@@ -57,16 +53,18 @@ def claims(content: Content) -> list[object] | None:
 def designs_of_a_paper(content: Content) -> list[object]:
     """Words and table of the designs that a publication prints; nothing without any."""
     verified = content.get("verification")
-    if verified is None or not content.is_compared:
+    if verified is None or "mean_paper" not in verified:
         return []
-    names = [name for name in names_in(verified) if labels.is_printed(verified.sel(design=name))]
+    printed = {
+        one.text("design"): one for one in each(verified, "design") if labels.is_printed(one)
+    }
     words = (
         "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
         "nothing was fitted to them."
     )
     columns = (*SIMULATED[:2], *_PRINTED)
     title = "Table 4: designs of the paper, by simulation with 95 % half-widths and as printed"
-    return [words, table_of(verified, {name: name for name in names}, columns, title)]
+    return [words, table_of(verified, {name: name for name in printed}, columns, title)]
 
 
 def paper(content: Content) -> list[object] | None:

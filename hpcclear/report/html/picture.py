@@ -114,8 +114,8 @@ def _ends(one: Results, name: str) -> tuple[()] | tuple[float, float]:
 def _verified(one: Results) -> dict[str, Goal]:
     """What the case of a design makes small, by simulation: unit and value by its words."""
     return {
-        str(one[f"{name}_goal"].item()): (
-            str(one[f"{name}_unit"].item()) or "1",
+        one.text(f"{name}_goal"): (
+            one.text(f"{name}_unit") or "1",
             float(one[f"{name}_true"]),
             *_ends(one, name),
         )
@@ -125,7 +125,7 @@ def _verified(one: Results) -> dict[str, Goal]:
 
 def _design(one: Results) -> dict[str, Any]:
     """A design that was simulated directly."""
-    name = str(one["design"].item())
+    name = one.text("design")
     is_original = name.rpartition(" ")[2] == "original"
     surrogate = (
         _moments(one, "mean_surrogate", "deviation_surrogate") if "mean_surrogate" in one else []
@@ -133,7 +133,7 @@ def _design(one: Results) -> dict[str, Any]:
     return {
         "kind": "printed" if labels.is_printed(one) else "original" if is_original else "design",
         "name": name,
-        "case": str(one["case"].item()) if "case" in one else "",
+        "case": one.text("case"),
         "design": _values(one),
         "surrogate": surrogate,
         "direct": simulated(one),
@@ -164,7 +164,7 @@ def series(response: Results, most: int = 720) -> list[dict[str, Any]]:
     found = []
     for name, joint, word in motion.quantities(shown):
         one = shown[name].sel(joint=joint) if joint else shown[name]
-        values = np.nan_to_num(one.to_numpy())
+        values = np.nan_to_num(one.values)
         found.append(
             {
                 "label": word,
@@ -186,7 +186,7 @@ def frames(response: Results, before: Results) -> dict[str, Any]:
     e = moving.eccentricities(shown.sel(joint=motion.pins(shown)))
     bodies, points, angles = moving.bodies(shown)
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
-    names = ["crank", "rod", "slider"] if "rod_x" in shown else shown["body"].to_numpy().tolist()
+    names = ["crank", "rod", "slider"] if "rod_x" in shown else shown["body"].values.tolist()
     different = sketch.differences(response, before)
     return {
         "bodies": bodies,
@@ -199,7 +199,7 @@ def frames(response: Results, before: Results) -> dict[str, Any]:
         "clearance": np.nan_to_num(motion.clearances(held)).tolist(),
         "turn": _digits(motion.turns(shown)),
         "e": _digits(e.reshape(len(e), -1)),
-        "force": _digits(shown["contact_force"].sel(joint=motion.pins(shown)).to_numpy()),
+        "force": _digits(shown["contact_force"].sel(joint=motion.pins(shown)).values),
     }
 
 

@@ -9,7 +9,7 @@ import tomli_w
 from hpcclear.base.outcome import Status
 from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
-from hpcclear.report.html.content import Content, scene_in
+from hpcclear.report.html.content import Content, scene_of
 from hpcclear.report.html.markup import Number, PageTable, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
@@ -18,11 +18,8 @@ from hpcclear.scene.loading import parse
 LISTED = 40  # samples listed by number before the rest is only counted
 
 
-def screened(content: Content) -> list[object] | None:
+def screened(found: Results, content: Content) -> list[object]:
     """What each effect changes and saves, why others are kept, and the tables of the scene without what can be neglected."""
-    found = content.get("effects")
-    if found is None:
-        return None
     seconds = effects.seconds_of(content.get("timing"))
     kept = json.loads(found.attrs["kept"]).items()
     return [
@@ -35,14 +32,10 @@ def screened(content: Content) -> list[object] | None:
 
 def _changes(found: Results, seconds: effects.Times) -> PageTable:
     """A row a variant: what is off, changes with confidence intervals, time, verdict."""
-    shown = [
-        k
-        for k in range(found.sizes["response"])
-        if np.isfinite(found["change"].isel(response=k)[1:]).any()
-    ]
-    words = {"mean": "mean f", "deviation": "std. dev."}
-    names = (str(found["response"].to_numpy()[k]) for k in shown)
-    header = ["off", *(words.get(name, name) for name in names), "run time saved", "within"]
+    shown = np.flatnonzero(np.isfinite(found["change"][1:]).any(axis=0))
+    words, every = {"mean": "mean f", "deviation": "std. dev."}, found.texts("response")
+    names = (words.get(every[k], every[k]) for k in shown)
+    header = ["off", *names, "run time saved", "within"]
     rows: list[list[object]] = []
     for k in range(1, found.sizes["variant"]):
         one = found.isel(variant=k)
@@ -55,8 +48,8 @@ def _changes(found: Results, seconds: effects.Times) -> PageTable:
 
 def _changed(found: Results) -> str:
     """Tables of the scene that change where what can be neglected is left out, as TOML to paste; "" if nothing can."""
-    chosen = int(np.argmax(found["recommended"].to_numpy()))
-    scene = scene_in(str(found.attrs["scene"]))
+    chosen = int(np.argmax(found["recommended"].values))
+    scene = scene_of(found)
     if not chosen or scene is None:
         return ""
     whole = scene.resolved()
@@ -68,28 +61,23 @@ def _changed(found: Results) -> str:
     return f"{head}{more}.\n{tomli_w.dumps(changed)}"
 
 
-def identified_machine(content: Content) -> list[object] | None:
+def identified_machine(found: Results, content: Content) -> list[object]:
     """Unknowns of a machine with their intervals, growth, what to measure, and warnings."""
-    found = content.get("identify")
-    if found is None:
-        return None
     rows = [[line.label, line.text] for line in identified.lines(found)]
     table = PageTable(["quantity", "result"], rows, "Unknowns of the machine")
     return [table, *(f"Warning: {text}." for text in identified.warnings(found))]
 
 
-def statistics(content: Content) -> list[object] | None:
+def statistics(samples: Results, content: Content) -> list[object]:
     """Statistics of the samples, shares beyond thresholds of the study, and warnings; of a study its designs have them."""
-    samples = content.get("samples")
-    if samples is None or content.get("verification") is not None:
-        return None
+    if "verification" in content.files:
+        return []
     lines = spread.statistics(samples, _thresholds(samples))
     rows = [[line.label, line.text] for line in [*lines, *spread.in_time(samples)]]
-    table = PageTable(
-        ["quantity", "95 % confidence interval in brackets"], rows, "Statistics of the samples"
-    )
+    header = ["quantity", "95 % confidence interval in brackets"]
+    table = PageTable(header, rows, "Statistics of the samples")
     warnings = [f"Warning: {text}." for text in spread.remarks(samples)]
-    return [*([table] if rows else []), *warnings] or None
+    return [*([table] if rows else []), *warnings]
 
 
 def compared(content: Content) -> list[object] | None:
@@ -104,24 +92,17 @@ def compared(content: Content) -> list[object] | None:
 
 def _thresholds(samples: Results) -> list[spread.Beyond]:
     """Values of f that the cases of the study keep below, or whose exceedance they make small."""
-    scene = scene_in(str(samples.attrs.get("scene", "")))
-    study = None if scene is None else scene.study
-    goals = [
-        goal
-        for case in (study.cases if study else ())
-        for goal in (*(case.objectives or ()), *(case.constraints or ()))
-    ]
-    values = {goal.limit for goal in goals if goal.limit is not None}
+    scene = scene_of(samples)
+    cases = scene.study.cases if scene is not None and scene.study is not None else ()
+    goals = [(*(case.objectives or ()), *(case.constraints or ())) for case in cases]
+    values = {goal.limit for own in goals for goal in own if goal.limit is not None}
     return [spread.Beyond("objective", value) for value in sorted(values)]
 
 
-def trust(content: Content) -> list[object] | None:
+def trust(samples: Results, content: Content) -> list[object]:
     """Samples that failed, and those to be read with care."""
-    samples = content.get("samples")
-    if samples is None:
-        return None
-    status = samples["status"].to_numpy()
-    numbers = samples["sample"].to_numpy()
+    status = samples["status"].values
+    numbers = samples["sample"].values
     failed: list[list[object]] = []
     for code in Status:
         hit = numbers[status == code]
@@ -130,7 +111,7 @@ def trust(content: Content) -> list[object] | None:
             which = _listed(hit, len(numbers))
             name = code.name.lower()
             failed.append([name, Number(len(hit)), code.message, place, code.remedy, which])
-    flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(numbers), int)
+    flags = samples["flags"].values if "flags" in samples else np.zeros(len(numbers), int)
     marked: list[list[object]] = []
     for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]
@@ -138,13 +119,12 @@ def trust(content: Content) -> list[object] | None:
             which = _listed(hit, len(numbers))
             marked.append([flag.name.lower(), Number(len(hit)), words, which])
     heads = ["outcome", "samples", "what happened", "where", "what to change", "which"]
+    lost = PageTable(heads, failed, "Samples that failed; their numbers are missing, never 0")
+    heads = ["flag", "samples", "why", "which"]
+    careful = PageTable(heads, marked, "Valid results to be read with care")
     return [
-        PageTable(heads, failed, "Samples that failed; their numbers are missing, never 0")
-        if failed
-        else "No sample failed.",
-        PageTable(["flag", "samples", "why", "which"], marked, "Valid results to be read with care")
-        if marked
-        else "No sample carries a warning.",
+        lost if failed else "No sample failed.",
+        careful if marked else "No sample carries a warning.",
     ]
 
 
@@ -159,9 +139,11 @@ def _listed(numbers: Sequence[int] | np.ndarray, of: int) -> str:
 
 
 PARTS = (
-    SectionOf(10, "identify", "identified", "Identified machine", identified_machine),
-    SectionOf(10, "effects", "screened", "Effects", screened),
+    SectionOf(10, "identify", "identified", "Identified machine", identified_machine, "identify"),
+    SectionOf(10, "effects", "screened", "Effects", screened, "effects"),
     SectionOf(10, "quality", "compared", "Comparison", compared),
-    SectionOf(20, "quality", "statistics", "Statistics of the samples", statistics, each=True),
-    SectionOf(30, "quality", "trust", "Data quality", trust, each=True),
+    SectionOf(
+        20, "quality", "statistics", "Statistics of the samples", statistics, "samples", True
+    ),
+    SectionOf(30, "quality", "trust", "Data quality", trust, "samples", True),
 )

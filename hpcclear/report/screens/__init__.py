@@ -4,28 +4,36 @@ from dataclasses import replace
 from importlib import import_module
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Screen, Trust, trusted
+from hpcclear.report.screen import Screen, Trust, trusted
 
-_OF = {
-    "study": {"verification"},
-    "lives": {"wear"},
-    "findings": {"identify", "effects", "accuracy"},
-    "batches": {"map", "bifurcation", "samples", "statistics"},
-    "response": {"response"},
+_MAKERS = {
+    "verification": "study.screen",
+    "wear": "lives.screen",
+    "identify": "findings.machine",
+    "accuracy": "findings.accuracy",
+    "effects": "findings.effects",
+    "map": "batches.map_of_motion",
+    "bifurcation": "batches.bifurcation",
+    "samples": "batches.samples",
+    "statistics": "batches.statistics",
+    "response": "response.screen",
 }
-"""Modules, the first that makes a screen first, and the kinds of their files."""
+"""Module and function that make the screen of a kind, from its file and all results; the first that makes one counts."""
 
 
 def screen_of(content: Content) -> Screen | None:
     """Return the first screen of results; None of those that have none."""
-    kinds = {*content.files, *(["response"] if content.responses else [])}
-    modules = [import_module(f"{__name__}.{name}") for name, own in _OF.items() if own & kinds]
-    made = (make(content) for module in modules for make in module.SCREENS)
-    first: Screen | None = next((one for one in made if one is not None), None)
-    if first is None:
-        return None
-    first = replace(first, title=content.attribute("about_title"))
-    if not content.troubles:
-        return first
-    lost = Trust(Level.RED, f"Not all files are here: {content.troubles[0]}", "reproduce")
-    return replace(first, trust=trusted([*first.trust, lost]))
+    response = content.response
+    files = content.files if response is None else {**content.files, "response": response}
+    for kind, place in _MAKERS.items():
+        module, _, name = place.partition(".")
+        made: Screen | None = None
+        if kind in files:
+            made = getattr(import_module(f"{__name__}.{module}"), name)(files[kind], content)
+        if made is not None:
+            first = replace(made, title=content.attribute("about_title"))
+            if not content.troubles:
+                return first
+            lost = Trust.red(f"Not all files are here: {content.troubles[0]}", "reproduce")
+            return replace(first, trust=trusted([*first.trust, lost]))
+    return None

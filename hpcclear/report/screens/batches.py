@@ -8,22 +8,18 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import bearings, failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
 
 MOST = 0.5
 """Share of samples with a warning from which on it is red."""
 
 
-def compared(content: Content) -> Screen | None:
-    """Return the first screen of several samples beside each other; None where there are not several."""
-    if not content.samples:
-        return None
+def _compared(content: Content) -> Screen:
+    """The first screen of several samples beside each other."""
     every = {name: own["samples"] for name, own in content.samples.items()}
-    names = "P95 of f", "mean of f", "std. deviation of f"
-    rows = [
-        row for row in spread.rows_of(spread.side_by_side(every)) if row[0] in ("samples", *names)
-    ]
+    names = "samples", "P95 of f", "mean of f", "std. deviation of f"
+    rows = [row for row in spread.rows_of(spread.side_by_side(every)) if row[0] in names]
     worries = [one for found in every.values() for one in _trust(found)]
     return Screen(
         f"{len(every)} files of samples, beside each other",
@@ -33,18 +29,13 @@ def compared(content: Content) -> Screen | None:
     )
 
 
-def samples(content: Content) -> Screen | None:
-    """Return the first screen of samples; None without any."""
-    found = content.get("samples")
-    if found is None:
-        return None
-    f, unit = found["objective"].to_numpy(), str(found["objective"].attrs["units"])
+def samples(found: Results, content: Content) -> Screen:
+    """Return the first screen of samples, of several beside each other."""
+    if content.samples:
+        return _compared(content)
+    f, unit = found["objective"].values, str(found["objective"].attrs["units"])
     names = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    about = (
-        f"f: {labels.objective(found)}",
-        f"{len(f)} simulations",
-        f"varied: {names}" if names else "",
-    )
+    varied = f"varied: {names}" if names else ""
     lines = spread.statistics(found)
     shown = {line.label: line for line in lines if line.estimate.known}
     tiles = tuple(
@@ -52,27 +43,22 @@ def samples(content: Content) -> Screen | None:
         for line in shown.values()
         if line.label in ("mean of f", "std. deviation of f", "P95 of f", "median of f")
     )
-    if not np.isfinite(f).any():
-        headline = "Every simulation failed"
-    elif "mean of f" in shown:
-        headline = f"mean of f {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
-    else:
-        headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"
     rows = [
         ScreenRow(line.label, (line.text.partition(" (")[0], _interval(line)))
         for line in shown.values()
-        if line.label.startswith("P95 peak") or line.label.startswith("P99")
+        if line.label.startswith(("P95 peak", "P99"))
     ]
+    headline = "Every simulation failed"
     if np.isfinite(f).any():
-        ends = (
-            labels.quantity(float(np.nanmin(f)), unit),
-            labels.quantity(float(np.nanmax(f)), unit),
-        )
+        headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"
+        ends = (labels.quantity(float(end(f)), unit) for end in (np.nanmin, np.nanmax))
         rows.insert(0, ScreenRow("range of f", (" to ".join(ends), "")))
+    if "mean of f" in shown:
+        headline = f"mean of f {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
     share = _share(found, Flag.BEYOND_HERTZ)
     return Screen(
         labels.sentence(headline, found),
-        about,
+        (f"f: {labels.objective(found)}", f"{len(f)} simulations", varied),
         "the contact model is outside its range" if share > MOST else "",
         tiles,
         ("statistic", "value", "95 % CI") if rows else (),
@@ -90,51 +76,43 @@ def _interval(line: spread.Line) -> str:
 
 
 def _share(found: Results, flag: Flag) -> float:
-    return float(((found["flags"].to_numpy() & int(flag)) != 0).mean()) if "flags" in found else 0.0
+    return float(((found["flags"].values & int(flag)) != 0).mean()) if "flags" in found else 0.0
 
 
 def _trust(found: Results) -> Iterator[Trust]:
-    good = found["status"].to_numpy() == Status.OK
+    good = found["status"].values == Status.OK
     for text in failures.explained(found)[:2]:
-        yield Trust(Level.AMBER if good.any() else Level.RED, text, "quality")
+        yield (Trust.amber if good.any() else Trust.red)(text, "quality")
     if good.all():
-        yield Trust(Level.GREEN, "No simulation failed", "quality")
+        yield Trust.green("No simulation failed", "quality")
+    outside = bearings.outside(found) or "forces are indicative"
     for flag, text in (
-        (
-            Flag.BEYOND_HERTZ,
-            f"contact model outside its range, {bearings.outside(found) or 'forces are indicative'}",
-        ),
+        (Flag.BEYOND_HERTZ, f"contact model outside its range, {outside}"),
         (Flag.LATCHED, "a joint never left contact, f may depend on the integration tolerance"),
         (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
     ):
         if share := _share(found, flag):
-            level = Level.RED if share > MOST and flag is not Flag.LATCHED else Level.AMBER
-            yield Trust(level, f"{spread.percent(share)} of the samples: {text}", "quality")
+            level = Trust.red if share > MOST and flag is not Flag.LATCHED else Trust.amber
+            yield level(f"{spread.percent(share)} of the samples: {text}", "quality")
     name = "objective_limit" if "objective_limit" in found else "objective_uncertainty"
-    if not np.isfinite(found[name].to_numpy()).any():
-        yield Trust(
-            Level.AMBER,
-            "The half-width of a single f was not checked (numerics.target_error)",
-            "quality",
-        )
+    if not np.isfinite(found[name].values).any():
+        text = "The half-width of a single f was not checked (numerics.target_error)"
+        yield Trust.amber(text, "quality")
     if "sampling" not in found.attrs:
-        yield Trust(Level.AMBER, "The designs were chosen, not drawn: no intervals", "quality")
+        yield Trust.amber("The designs were chosen, not drawn: no intervals", "quality")
 
 
-def map_of_motion(content: Content) -> Screen | None:
-    """Return the first screen of a map; None without one."""
-    found = content.get("map")
-    if found is None:
-        return None
-    good = found["status"].to_numpy() == Status.OK
-    regimes = found["regime"].to_numpy()
+def map_of_motion(found: Results, content: Content) -> Screen:
+    """Return the first screen of a map."""
+    good = found["status"].values == Status.OK
+    regimes = found["regime"].values
     cells, count = len(good), int(good.sum())
     kinds = [(regime, int(((regimes == regime) & good).sum())) for regime in Regime]
     kinds = sorted((one for one in kinds if one[1]), key=lambda one: -one[1])
-    growth = found["lyapunov_exponent"].to_numpy()[good]
-    periods = np.unique(found["period"].to_numpy()[good])
+    growth = found["lyapunov_exponent"].values[good]
+    periods = np.unique(found["period"].values[good])
     known = ", ".join(f"{one:.0f}" for one in periods[np.isfinite(periods)][:6])
-    f, unit = found["objective"].to_numpy()[good], str(found["objective"].attrs["units"])
+    f, unit = found["objective"].values[good], str(found["objective"].attrs["units"])
     headline = "Every cell failed"
     if kinds:
         (most, _, why), *rest = (regime.meaning.partition(":") for regime, _ in kinds[:2])
@@ -148,23 +126,16 @@ def map_of_motion(content: Content) -> Screen | None:
             Tile("range of f", labels.between(float(f.min()), float(f.max()), unit)),
         )
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    level = Level.GREEN if count == cells else Level.AMBER
-    trust = [Trust(level, f"{count} of {cells} cells without failure", "quality")]
-    open_ = sum(
-        n for regime, n in kinds if regime in (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
-    )
-    if open_:
+    level = Trust.green if count == cells else Trust.amber
+    trust = [level(f"{count} of {cells} cells without failure", "quality")]
+    moving = (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
+    if open_ := sum(n for regime, n in kinds if regime in moving):
         text = f"{open_} cells have not settled: longer transients would decide"
-        trust.append(Trust(Level.AMBER, text, "quality"))
+        trust.append(Trust.amber(text, "quality"))
     if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
-        level = Level.RED if share > MOST else Level.AMBER
-        trust.append(
-            Trust(
-                level,
-                f"{spread.percent(share)} of the cells: contact model outside its range, {bearings.outside(found)}",
-                "quality",
-            )
-        )
+        level = Trust.red if share > MOST else Trust.amber
+        text = f"contact model outside its range, {bearings.outside(found)}"
+        trust.append(level(f"{spread.percent(share)} of the cells: {text}", "quality"))
     rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
     return Screen(
         headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
@@ -174,36 +145,26 @@ def map_of_motion(content: Content) -> Screen | None:
     )  # fmt: skip
 
 
-def bifurcation(content: Content) -> Screen | None:
-    """Return the first screen of a bifurcation diagram; None without one."""
-    found = content.get("bifurcation")
-    if found is None:
-        return None
+def bifurcation(found: Results, content: Content) -> Screen:
+    """Return the first screen of a bifurcation diagram."""
     seen = found["observed"]
     count, crossings = seen.shape
-    failed = int(np.isnan(seen.to_numpy()).all(axis=1).sum())
+    failed = int(np.isnan(seen.values).all(axis=1).sum())
     what, unit = str(seen.attrs["long_name"]), str(seen.attrs["units"])
     headline = "Every value failed"
     if failed < count:
-        ends = float(np.nanmin(seen.to_numpy())), float(np.nanmax(seen.to_numpy()))
+        ends = float(np.nanmin(seen.values)), float(np.nanmax(seen.values))
         headline = f"{what}: {labels.between(*ends, unit)}"
-    level = Level.AMBER if failed else Level.GREEN
-    trust = Trust(level, f"{count - failed} of {count} values without failure", "reproduce")
-    return Screen(
-        headline,
-        (f"{count} values, {crossings} revolutions each",),
-        trust=(trust,),
-        figures=("bifurcation",),
-    )
+    level = Trust.amber if failed else Trust.green
+    trust = level(f"{count - failed} of {count} values without failure", "reproduce")
+    about = f"{count} values, {crossings} revolutions each"
+    return Screen(headline, (about,), trust=(trust,), figures=("bifurcation",))
 
 
-def statistics(content: Content) -> Screen | None:
-    """Return the first screen of samples that were summed up and not kept; None without."""
-    found = content.get("statistics")
-    if found is None:
-        return None
+def statistics(found: Results, content: Content) -> Screen:
+    """Return the first screen of samples that were summed up and not kept."""
     by_status = found["samples_by_status"]
-    total, good = int(np.sum(by_status.to_numpy())), int(by_status.sel(outcome=int(Status.OK)))
+    total, good = int(np.sum(by_status.values)), int(by_status.sel(outcome=int(Status.OK)))
     number = int(found["objective_count"])
     headline, tiles = "Every simulation failed", list[Tile]()
     if number > 1:
@@ -214,18 +175,8 @@ def statistics(content: Content) -> Screen | None:
         headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
         tiles.append(Tile("mean of f", shown[0], within=f"standard error {error}"))
         tiles.append(Tile("std. deviation of f", shown[1]))
-    lost = Trust(
-        Level.AMBER if good < total else Level.GREEN,
-        f"{good} of {total} simulations without failure",
-        "quality",
-    )
-    single = Trust(Level.AMBER, "The half-width of a single f was not checked", "quality")
-    return Screen(
-        labels.sentence(headline, found),
-        (f"f: {labels.objective(found)}",),
-        tiles=tuple(tiles),
-        trust=trusted([lost, single]),
-    )
-
-
-SCREENS = (compared, map_of_motion, bifurcation, samples, statistics)
+    level = Trust.amber if good < total else Trust.green
+    lost = level(f"{good} of {total} simulations without failure", "quality")
+    single = Trust.amber("The half-width of a single f was not checked", "quality")
+    about, trust = (f"f: {labels.objective(found)}",), trusted([lost, single])
+    return Screen(labels.sentence(headline, found), about, tiles=tuple(tiles), trust=trust)

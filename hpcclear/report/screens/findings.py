@@ -10,47 +10,38 @@ from hpcclear.report import identified, targets
 from hpcclear.report.figures import effects as screening
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted, upper
 from hpcclear.results.content import Results
 
 MOST = 4
 """Unknowns of a record that have a figure; where there are more, all are in the table."""
 
 
-def machine(content: Content) -> Screen | None:
-    """Return the first screen of an identified machine; None without one."""
-    found = content.get("identify")
-    if found is None:
-        return None
+def machine(found: Results, content: Content) -> Screen:
+    """Return the first screen of an identified machine."""
     lines = identified.lines(found)
     known = "interval" in found
-    trust = [
-        Trust(Level.RED, f"{text[0].upper()}{text[1:]}", "identify")
-        for text in identified.warnings(found)
-    ]
+    trust = [Trust.red(upper(text), "identify") for text in identified.warnings(found)]
     if known and not trust:
-        trust.append(Trust(Level.GREEN, "The model explains every signal", "identify"))
+        trust.append(Trust.green("The model explains every signal", "identify"))
     if known:
-        coverage = float(np.min(found["coverage"].to_numpy()))
-        level = Level.GREEN if coverage >= 0.9 else Level.AMBER
+        coverage = float(np.min(found["coverage"].values))
+        level = Trust.green if coverage >= 0.9 else Trust.amber
         text = f"Check: the 95 % interval holds for {100 * coverage:.0f} % of simulated machines"
-        trust.append(Trust(level, text, "identify"))
+        trust.append(level(text, "identify"))
     unknown = _unknowns(found) if known else []
     headline = "What to measure: expected half-widths of each signal"
     if unknown:
         last = unknown[-found.sizes["unknown"] :]
-        headline = "; ".join(f"{label[0].upper()}{label[1:]}: {text}" for label, text in last[:2])
-    failed = known and not found["explained"].to_numpy().all()
+        headline = "; ".join(f"{upper(label)}: {text}" for label, text in last[:2])
+    failed = known and not found["explained"].values.all()
     tiles = [
         Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
         for label, text in unknown
     ]
     above = {label.partition(",")[0] for label, _ in unknown if len(unknown) <= MOST}
-    rows = tuple(
-        ScreenRow(line.label, (line.text,))
-        for line in lines
-        if line.label not in above | {"calibration"}
-    )
+    shown = (line for line in lines if line.label not in above | {"calibration"})
+    rows = tuple(ScreenRow(line.label, (line.text,)) for line in shown)
     return Screen(
         headline,
         (f"measured records: {found.sizes['record']}",) if known else (),
@@ -65,7 +56,7 @@ def machine(content: Content) -> Screen | None:
 
 def _unknowns(found: Results) -> list[tuple[str, str]]:
     """Unknowns of each record with their intervals, in words; of several records with their names."""
-    records, names = found["record"].to_numpy(), found["unknown"].to_numpy()
+    records, names = found["record"].values, found["unknown"].values
     ends = [f", {Path(str(one)).name}" * (len(records) > 1) for one in records]
     return [
         (identified.named(name) + end, identified.interval(found, k, u))
@@ -74,62 +65,46 @@ def _unknowns(found: Results) -> list[tuple[str, str]]:
     ]
 
 
-def effects(content: Content) -> Screen | None:
-    """Return the first screen of an effect screening; None without one."""
-    found = content.get("effects")
-    if found is None:
-        return None
+def effects(found: Results, content: Content) -> Screen:
+    """Return the first screen of an effect screening."""
     seconds = screening.seconds_of(content.get("timing"))
     tolerance = f"{100 * float(found.attrs['tolerance']):g} %"
-    chosen = int(np.argmax(found["recommended"].to_numpy()))
+    chosen = int(np.argmax(found["recommended"].values))
     names, saved = screening.named(found, chosen), screening.saving(found, chosen, seconds)
     headline = (
         f"Within {tolerance}, {', '.join(names)} can be neglected: run time saved {saved.words}"
         if chosen
         else f"No effect can be neglected within {tolerance}"
     )
-    verdicts = ("yes", "no", "undecided")
-    rows = tuple(
-        ScreenRow(
-            screening.label(screening.named(found, k)),
-            (
-                screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0])),
-                verdicts[int(found["decision"][k])],
-                screening.saving(found, k, seconds).words,
-            ),
-        )
-        for k in range(1, found.sizes["variant"])
-    )
+    rows = []
+    for k in range(1, found.sizes["variant"]):
+        change = screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0]))
+        within = ("yes", "no", "undecided")[int(found["decision"][k])]
+        cells = change, within, screening.saving(found, k, seconds).words
+        rows.append(ScreenRow(screening.label(screening.named(found, k)), cells))
     return Screen(
-        headline, (f"f: {labels.objective(found)}", f"{int(np.sum(found['samples'].to_numpy()))} simulations"),
-        header=("disabled", "change of f", "within", "run time saved"), rows=rows,
+        headline, (f"f: {labels.objective(found)}", f"{int(np.sum(found['samples'].values))} simulations"),
+        header=("disabled", "change of f", "within", "run time saved"), rows=tuple(rows),
         trust=trusted(_screened(found)), figures=("effects",),
         steps=("--scene FILE writes the scene without them",) if chosen else (),
     )  # fmt: skip
 
 
 def _screened(found: Results) -> Iterator[Trust]:
-    decisions = found["decision"].to_numpy()[1:]
-    open_ = int((decisions == Verdict.UNDECIDED).sum())
-    if open_:
-        yield Trust(
-            Level.AMBER,
-            f"{open_} of {len(decisions)} variants are undecided: more samples would decide",
-            "effects",
-        )
+    decisions = found["decision"].values[1:]
+    if open_ := int((decisions == Verdict.UNDECIDED).sum()):
+        text = f"{open_} of {len(decisions)} variants are undecided: more samples would decide"
+        yield Trust.amber(text, "effects")
     else:
-        yield Trust(Level.GREEN, "Every variant is decided", "effects")
-    if failed := int(np.sum(found["failed"].to_numpy())):
-        yield Trust(Level.AMBER, f"{failed} simulations failed", "effects")
+        yield Trust.green("Every variant is decided", "effects")
+    if failed := int(np.sum(found["failed"].values)):
+        yield Trust.amber(f"{failed} simulations failed", "effects")
     level = f"{100 * float(found.attrs['confidence']):.0f} %"
-    yield Trust(Level.GREEN, f"Intervals of {level}, from averages over the same points", "effects")
+    yield Trust.green(f"Intervals of {level}, from averages over the same points", "effects")
 
 
-def accuracy(content: Content) -> Screen | None:
-    """Return the first screen of accuracy against run time; None without."""
-    found = content.get("accuracy")
-    if found is None:
-        return None
+def accuracy(found: Results, content: Content) -> Screen:
+    """Return the first screen of accuracy against run time."""
     own = targets.settings(found)
     ways = [(target, targets.cheapest(found, target)) for target in targets.TARGETS]
     rows = [
@@ -148,12 +123,9 @@ def accuracy(content: Content) -> Screen | None:
         if reached:
             target, way = reached[-1]
             headline = f"An error of f of {100 * target:g} % costs {targets.seconds(way.seconds)} of one core per design"
-    known = Trust(Level.GREEN, "Errors against references with much tighter settings", "accuracy")
-    times = Trust(Level.AMBER, "Times are those of one core of this machine", "accuracy")
+    known = Trust.green("Errors against references with much tighter settings", "accuracy")
+    times = Trust.amber("Times are those of one core of this machine", "accuracy")
     return Screen(
         headline, header=("target", "settings", "time of one core"), rows=tuple(rows),
         trust=trusted([known, times]), figures=("accuracy",),
     )  # fmt: skip
-
-
-SCREENS = (machine, accuracy, effects)

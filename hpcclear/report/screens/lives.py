@@ -10,7 +10,7 @@ from hpcclear.report.figures.labels import quantity
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
-from hpcclear.report.screen import Level, Screen, ScreenRow, ShareBar, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, ShareBar, Tile, Trust, trusted, upper
 from hpcclear.results.content import Results
 from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
 
@@ -25,23 +25,18 @@ REASONS = {
 """How lives end, by what the file has as their reason."""
 
 
-def screen(content: Content) -> Screen | None:
-    """Return the first screen of service lives; None without any."""
-    lives = content.get("wear")
-    if lives is None:
-        return None
+def screen(lives: Results, content: Content) -> Screen:
+    """Return the first screen of service lives."""
     if not followed(lives).any():
-        failed = (Trust(Level.RED, text, "lives") for text in _failed(lives))
+        failed = (Trust.red(text, "lives") for text in _failed(lives))
         return Screen("Every service life failed", trust=trusted(failed))
     rows = tuple(ScreenRow(name, tuple(cells)) for name, *cells in _clearances(lives))
     causes = [ShareBar(f"{name}, {joint}", share, np.nan) for joint, name, share in _inputs(lives)]
     named = ", ".join(f"{one.label} {one.share:.2f}" for one in causes)
+    length = f"up to {_long(float(lives['cycle'][-1]))} revolutions"
     return Screen(
         _headline(lives),
-        (
-            f"{lives.sizes['life']} service lives",
-            f"up to {_long(float(lives['cycle'][-1]))} revolutions",
-        ),
+        (f"{lives.sizes['life']} service lives", length),
         "",
         tuple(_tiles(lives)),
         ("radial clearance", "new (median)", "final (median)", "5 to 95 %"),
@@ -56,7 +51,7 @@ def screen(content: Content) -> Screen | None:
 def followed(lives: Results) -> Booleans:
     """Return which lives did not fail, (lives,)."""
     lived = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
-    return np.isin(lives["ending"].to_numpy(), lived)
+    return np.isin(lives["ending"].values, lived)
 
 
 def _is_limited(lives: Results) -> bool:
@@ -66,7 +61,7 @@ def _is_limited(lives: Results) -> bool:
 def _headline(lives: Results) -> str:
     cycles = float(lives["cycle"][-1])
     if not _is_limited(lives):
-        worst = int(np.argmax(np.nanmedian(lives["end_clearance"].to_numpy(), axis=0)))
+        worst = int(np.argmax(np.nanmedian(lives["end_clearance"].values, axis=0)))
         name, _, end, _ = _clearances(lives)[worst]
         return f"After {_long(cycles)} revolutions the clearance of {name} is {end}"
     value, low, high = spread(lives, "lifetime", cycles)[0]
@@ -107,29 +102,23 @@ def _tiles(lives: Results) -> Iterator[Tile]:
 
 def _trust(lives: Results) -> Iterator[Trust]:
     count = lives.sizes["life"]
-    for text in doubts(lives):
-        yield Trust(Level.AMBER, f"{text[0].upper()}{text[1:]}", "lives")
+    yield from (Trust.amber(upper(text), "lives") for text in doubts(lives))
     failed = _failed(lives)
-    yield from (Trust(Level.AMBER, text, "lives") for text in failed)
+    yield from (Trust.amber(text, "lives") for text in failed)
     if not failed:
-        yield Trust(Level.GREEN, "No simulation failed", "lives")
-    open_ = int((lives["end_reason"].to_numpy() == "cycles").sum())
+        yield Trust.green("No simulation failed", "lives")
+    open_ = int((lives["end_reason"].values == "cycles").sum())
     if open_ and _is_limited(lives):
-        yield Trust(
-            Level.AMBER,
-            f"{open_} of {count} lives reached no limit: raise wear.cycles for their length",
-            "lives",
-        )
+        text = f"{open_} of {count} lives reached no limit: raise wear.cycles for their length"
+        yield Trust.amber(text, "lives")
     if count < (least := fewest(0.05)):
-        text = (
-            f"{count} lives do not bound the 5th percentile from below; {least} would (wear.lives)"
-        )
-        yield Trust(Level.AMBER, text, "lives")
+        text = f"{count} lives do not bound the 5th percentile from below; {least} would"
+        yield Trust.amber(f"{text} (wear.lives)", "lives")
 
 
 def _failed(lives: Results) -> list[str]:
     """How many lives failed with each status, and the remedy."""
-    codes = lives["ending"].to_numpy()
+    codes = lives["ending"].values
     statuses = [one for one in Status if not one.valid and one is not Status.WORN_THROUGH]
     return [
         f"{count} of {len(codes)} lives {status.name.lower()}: {status.message}. {status.remedy}"
@@ -142,12 +131,12 @@ def doubts(content: Results) -> list[str]:
     """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
     state."""
     texts = []
-    unsure = int((content["flags"].to_numpy() == Flag.TARGET_MISSED).sum())
+    unsure = int((content["flags"].values == Flag.TARGET_MISSED).sum())
     if unsure:
         texts.append(
             f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
         )
-    drift = content["drift"].to_numpy()
+    drift = content["drift"].values
     moving = int((drift > content.attrs["tolerance"]).sum())
     if moving:
         count = f"{moving} service {'life' if moving == 1 else 'lives'}"
@@ -156,7 +145,7 @@ def doubts(content: Results) -> list[str]:
             "raise numerics.transient_revolutions"
         )
     if "sharpest" in content:
-        narrow = int((content["sharpest"].to_numpy() > 1.0).sum())
+        narrow = int((content["sharpest"].values > 1.0).sum())
         if narrow:
             texts.append(
                 f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "
@@ -165,12 +154,11 @@ def doubts(content: Results) -> list[str]:
     return texts
 
 
-def section(content: Content) -> list[object] | None:
+def section(lives: Results, content: Content) -> list[object]:
     """What is known of service lives besides the first screen, in lines."""
-    lives = content.get("wear")
-    if lives is None or not followed(lives).any():
-        return None
-    reasons = lives["end_reason"].to_numpy()
+    if not followed(lives).any():
+        return []
+    reasons = lives["end_reason"].values
     rows: list[list[object]] = []
     for name, words in REASONS.items():
         if count := int((reasons == name).sum()):
@@ -182,8 +170,8 @@ def section(content: Content) -> list[object] | None:
 def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
     """Each joint with its new and final clearance, medians, and the range of the final one, "" where it has none."""
     rows = []
-    at_end = quantiles(lives["end_clearance"].to_numpy(), np.array([0.05, 0.5, 0.95]))
-    for k, name in enumerate(map(str, lives["joint"].to_numpy())):
+    at_end = quantiles(lives["end_clearance"].values, np.array([0.05, 0.5, 0.95]))
+    for k, name in enumerate(lives.texts("joint")):
         new = float(np.nanmedian(lives["clearance"].isel(cycle=0).sel(joint=name)))
         low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
         rows.append((name, quantity(new, "m"), middle, f"{low} to {high}" if low != high else ""))
@@ -193,7 +181,7 @@ def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
 def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str]]:
     """Return median, 5th and 95th percentile of lives in words, each with the ends of its confidence interval; lives that
     failed may be of any length."""
-    every = lives[name].to_numpy()
+    every = lives[name].values
     known = every[~np.isnan(every)]
 
     def one(value: float) -> str:
@@ -210,7 +198,7 @@ def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str
 def _lifetimes(lives: Results) -> list[list[object]]:
     """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
     cycles, last = float(lives["cycle"][-1]), lives.isel(cycle=-1)
-    each, followed = lives["revolution_time"].to_numpy() / HOUR, lives["ended"].to_numpy()
+    each, followed = lives["revolution_time"].values / HOUR, lives["ended"].values
     text = f"at most {followed.max():.4g} revolutions, or {(followed * each).max():.4g} h"
     rows: list[list[object]] = [["simulated", text]]
     if not _is_limited(lives):
@@ -225,7 +213,7 @@ def _lifetimes(lives: Results) -> list[list[object]]:
         ]
         text = "median {}; 5th percentile {}; 95th percentile {}".format(*texts)
         rows.append([f"service life, {unit}", text])
-    for name in lives["joint"].to_numpy() if "exceedance" in lives else ():
+    for name in lives["joint"].values if "exceedance" in lives else ():
         one = last.sel(joint=name)
         low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])
         text = f"{float(one['exceedance']):.3g} (95 % CI {low:.3g} to {high:.3g})"
@@ -238,9 +226,9 @@ def _profiles(lives: Results) -> list[list[object]]:
     if "local_clearance" not in lives:
         return []
     rows: list[list[object]] = []
-    for k, name in enumerate(lives["joint"].to_numpy()):
+    for k, name in enumerate(lives["joint"].values):
         largest = quantity(float(np.nanmedian(lives["end_clearance"][:, k])), "m")
-        even = lives["even_clearance"].isel(cycle=-1).sel(joint=name).to_numpy()
+        even = lives["even_clearance"].isel(cycle=-1).sel(joint=name).values
         known = np.isfinite(even).all()
         beside = f"; {quantity(float(np.median(even)), 'm')} with uniform wear" if known else ""
         rows.append([f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"])
@@ -255,13 +243,11 @@ def _profiles(lives: Results) -> list[list[object]]:
 
 def _inputs(lives: Results) -> Iterator[tuple[str, str, float]]:
     """The random input that decides most how fast each joint wears: joint, input, squared rank correlation."""
-    for joint in map(str, lives["joint"].to_numpy()):
-        share = lives["rank_correlation"].sel(joint=joint).to_numpy() ** 2
+    for joint in lives.texts("joint"):
+        share = lives["rank_correlation"].sel(joint=joint).values ** 2
         if len(share) and np.isfinite(share).any():
             k = int(np.nanargmax(share))
-            yield joint, str(lives["random_input"].to_numpy()[k]), float(share[k])
+            yield joint, str(lives["random_input"].values[k]), float(share[k])
 
 
-SCREENS = (screen,)
-
-PARTS = (SectionOf(10, "lives", "lives", "Service lives", section),)
+PARTS = (SectionOf(10, "lives", "lives", "Service lives", section, "wear"),)

@@ -8,15 +8,12 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
 
 
-def screen(content: Content) -> Screen | None:
-    """Return the first screen of the response of the baseline design, else of the first; None without any."""
-    response = content.response
-    if response is None:
-        return None
+def screen(response: Results, content: Content) -> Screen:
+    """Return the first screen of a response."""
     name = next(name for name, one in content.responses.items() if one is response)
     status = Status(int(response["status"]))
     if not status.valid:
@@ -24,38 +21,29 @@ def screen(content: Content) -> Screen | None:
         return Screen(
             f"The simulation failed: {said}",
             doubt="no number of it is a result",
-            trust=(Trust(Level.RED, status.remedy, "bearings"),),
+            trust=(Trust.red(status.remedy, "bearings"),),
             steps=(status.remedy,),
         )
     loads = bearings.bearings(response)
-    tiles = list(_tiles(response, loads))
     header = ("bearing", "peak force", "at crank angle", "mean force", "contact")
-    flags = int(response["flags"])
+    beyond = bool(int(response["flags"]) & Flag.BEYOND_HERTZ)
+    design = "" if name == "response" else name.replace("original", "baseline")
     return Screen(
         _headline(response, loads),
-        (
-            f"f: {labels.objective(response)}",
-            "" if name == "response" else name.replace("original", "baseline"),
-        ),
-        "the contact model is outside its range" if flags & Flag.BEYOND_HERTZ else "",
-        tuple(tiles),
+        (f"f: {labels.objective(response)}", design),
+        "the contact model is outside its range" if beyond else "",
+        tuple(_tiles(response, loads)),
         header if loads else (),
-        tuple(
-            ScreenRow(
-                one.joint,
-                (
-                    labels.quantity(one.peak, "N"),
-                    bearings.degrees(one),
-                    labels.quantity(one.mean, "N"),
-                    bearings.share(one.contact),
-                ),
-            )
-            for one in loads
-        ),
-        trust=trusted(_trust(response, loads), bool(flags & Flag.BEYOND_HERTZ)),
+        tuple(map(_row, loads)),
+        trust=trusted(_trust(response, loads), beyond),
         steps=tuple(_steps(response)),
         figures=("response", "orbit") if loads else ("response",),
     )
+
+
+def _row(one: bearings.Bearing) -> ScreenRow:
+    peak, mean = (labels.quantity(force, "N") for force in (one.peak, one.mean))
+    return ScreenRow(one.joint, (peak, bearings.degrees(one), mean, bearings.share(one.contact)))
 
 
 def _headline(response: Results, loads: Sequence[bearings.Bearing]) -> str:
@@ -98,41 +86,30 @@ def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Til
 
 
 def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Trust]:
-    flags = int(response["flags"])
+    flags, place = int(response["flags"]), "bearings"
     if flags & Flag.BEYOND_HERTZ:
         why = bearings.outside(response) or "forces are indicative"
-        yield Trust(Level.RED, f"Contact model outside its range: {why}", "bearings")
+        yield Trust.red(f"Contact model outside its range: {why}", place)
     elif loads:
-        yield Trust(Level.GREEN, "Contact model within its range", "bearings")
+        yield Trust.green("Contact model within its range", place)
     if flags & Flag.TARGET_MISSED:
-        yield Trust(Level.RED, "f is not known to numerics.target_error", "bearings")
+        yield Trust.red("f is not known to numerics.target_error", place)
     if flags & Flag.LATCHED:
-        yield Trust(
-            Level.AMBER,
-            "A joint never left contact: f may depend on the integration tolerance",
-            "bearings",
-        )
+        text = "A joint never left contact: f may depend on the integration tolerance"
+        yield Trust.amber(text, place)
     f, reach = float(response["objective"]), half_width(response)
     if not np.isfinite(reach):
-        yield Trust(
-            Level.AMBER, "The interval of f is not known: set numerics.target_error", "bearings"
-        )
+        yield Trust.amber("The interval of f is not known: set numerics.target_error", place)
     elif reach > bearings.SENSITIVE * abs(f):
-        yield Trust(
-            Level.AMBER,
-            f"f is sensitive to initial conditions or tolerance: {_within(response)}",
-            "bearings",
-        )
+        text = f"f is sensitive to initial conditions or tolerance: {_within(response)}"
+        yield Trust.amber(text, place)
     else:
-        yield Trust(Level.GREEN, f"f is known to {_within(response)}", "bearings")
+        yield Trust.green(f"f is known to {_within(response)}", place)
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
-        yield Trust(
-            Level.GREEN if regime is Regime.REGULAR else Level.AMBER,
-            f"Motion: {regime.meaning}",
-            "bearings",
-        )
+        level = Trust.green if regime is Regime.REGULAR else Trust.amber
+        yield level(f"Motion: {regime.meaning}", place)
     for text in str(response.attrs.get("cautions", "")).splitlines():
-        yield Trust(Level.AMBER, text, "bearings")
+        yield Trust.amber(text, place)
 
 
 def _steps(response: Results) -> Iterator[str]:
@@ -141,6 +118,3 @@ def _steps(response: Results) -> Iterator[str]:
         yield "stiffer bearings or less load"
     if not np.isfinite(half_width(response)):
         yield "numerics.target_error, for a mean with a confidence interval"
-
-
-SCREENS = (screen,)

@@ -10,23 +10,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Status
 from hpcclear.base.verdict import Verdict
-from hpcclear.report import alike, bearings, scatter
-from hpcclear.report.answer import (
-    FAR,
-    MANY,
-    beyond_hertz,
-    confidence,
-    steps,
-    surrogate_errors,
-    unit_of,
-)  # fmt: skip
-from hpcclear.report.constraints import ABSENT, OPEN, WORDS, verdict_of
+from hpcclear.report import alike, answer, bearings, scatter
+from hpcclear.report.answer import FAR, MANY, beyond_hertz
+from hpcclear.report.constraints import WORDS, constraints_of, verdict_of
 from hpcclear.report.figures import fits, labels
-from hpcclear.report.html.content import Content, scene_in
+from hpcclear.report.html.content import Content, scene_of
 from hpcclear.report.merit import baseline_of, best_of, goals_of, is_plain, ours_of, usual_of
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
-    Level,
     Screen,
     ScreenRow,
     ShareBar,
@@ -37,6 +28,7 @@ from hpcclear.report.screen import (
     lower,
     percent,
     trusted,
+    upper,
     within,
 )
 from hpcclear.results.content import Results
@@ -54,18 +46,17 @@ _INFEASIBLE = {
 }
 
 
-def screen(content: Content) -> Screen | None:
+def screen(verified: Results, content: Content) -> Screen | None:
     """Return the first screen of a verified study; None where nothing was verified."""
-    verified = content.get("verification")
-    if verified is None or not np.isfinite(verified["mean_true"]).any():
+    if not np.isfinite(verified["mean_true"]).any():
         return None
     ours = ours_of(verified)
     best, base = best_of(ours), baseline_of(ours)
     of = Recommended(content.files, ours, best)
-    kept = base is not None and str(base["design"].item()) == str(best["design"].item())
-    tiles = list(_tiles(best, None if kept else base, content))
+    kept = base is not None and base.text("design") == best.text("design")
+    today = None if kept else base
+    tiles = list(_tiles(best, today, content))
     bars, causes = _bars(of)
-    rows = tuple(_rows(best, None if kept else base))
     infeasible = verdict_of(best) in _INFEASIBLE
     column = "nearest" if infeasible else "today, kept" if kept else "recommended"
     return Screen(
@@ -73,20 +64,16 @@ def screen(content: Content) -> Screen | None:
         tuple(_about(of)),
         _doubt(of),
         tuple(tiles),
-        ("design", *(("today",) if base is not None and not kept else ()), column),
-        rows,
+        ("design", column) if today is None else ("design", "today", column),
+        tuple(_rows(best, today)),
         _remark(of),
         trusted(_trust(of), beyond_hertz(best) > MANY),
         tuple(bars),
         causes,
-        tuple(steps(of)),
+        tuple(answer.steps(of)),
         ("front",) if "front" in content.files else (),
-        (confidence(best),),
+        (answer.confidence(best),),
     )
-
-
-def _readable(one: Results) -> str:
-    return str(one["design"].item())
 
 
 def _headline(best: Results, tiles: list[Tile], kept: bool) -> str:
@@ -107,7 +94,7 @@ def _doubt(of: Recommended) -> str:
         found.append("the contact model is outside its range")
     if verdict_of(of.best) is Verdict.UNDECIDED:
         found.append("constraints are undecided")
-    if _missed(of.best):
+    if of.best.text("accuracy_missed"):
         found.append("the requested accuracy was not reached")
     return "; ".join(found)
 
@@ -117,15 +104,14 @@ def _about(of: Recommended) -> Iterator[str]:
     yield f"f: {labels.objective(of.ours)}"
     timing, designs = of.files.get("timing"), of.files["verification"].sizes["design"]
     if timing is not None and "samples" in timing:
-        count = f"{int(timing['samples'].to_numpy().sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
+        count = f"{int(timing['samples'].values.sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
         yield f"{count} simulations of {designs} designs and a surrogate"
 
 
 def _ends(one: Results, stem: str) -> tuple[float, float, float]:
     """A simulated value and the ends of its interval, NaN where they are not known."""
     value = float(one[stem if stem in one else f"{stem}_true"])
-    low, high = (float(one.get(f"{stem}_{end}", np.nan)) for end in ("lower", "upper"))
-    return value, low, high
+    return value, one.number(f"{stem}_lower"), one.number(f"{stem}_upper")
 
 
 def _statistics(best: Results) -> dict[str, str]:
@@ -133,7 +119,7 @@ def _statistics(best: Results) -> dict[str, str]:
     asked = [] if is_plain(best) else goals_of(best)
     usual = {Usual.MEAN: "mean", Usual.DEVIATION: "deviation"}
     shown = {usual.get(usual_of(best, name), name) for name in asked}
-    found = {str(best[f"{name}_goal"].item()): name for name in asked}
+    found = {best.text(f"{name}_goal"): name for name in asked}
     for stem, words in _USUAL.items():
         if stem not in shown and (stem in best or f"{stem}_true" in best):
             found.setdefault(f"{words} of f", stem)
@@ -146,7 +132,8 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
     yield from (one for label, one in limits.items() if label not in known)
     for words in sorted(known, key=lambda one: one not in limits):
         stem = known[words]
-        unit, mine = unit_of(best, stem if stem in best else f"{stem}_true"), _ends(best, stem)
+        name = stem if stem in best else f"{stem}_true"
+        unit, mine = answer.unit_of(best, name), _ends(best, stem)
         before = None if base is None else _ends(base, stem)
         moved, good = ("", None) if before is None else change(mine, before)
         shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
@@ -159,14 +146,11 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
 
 def _limits(best: Results) -> Iterator[Tile]:
     """Constraints with their verdicts."""
-    for own in _constraints(best):
-        unit, most = str(own["constraint_unit"].item()), float(own["constraint_most"])
-        value, low, high = (float(own[f"constraint_{end}"]) for end in ("true", "lower", "upper"))
-        verdict = Verdict(int(own["constraint_verdict"]))
-        held = f"at most {labels.quantity(most, unit)}: {WORDS[verdict]}"
-        text = "; ".join(filter(None, (within(value, low, high, unit), held)))
-        shown, label = labels.quantity(value, unit), str(own["constraint_goal"].item())
-        yield Tile(label, shown, within=text, good=verdict is Verdict.HOLDS)
+    for own in constraints_of(best):
+        interval = within(own.true, own.lower, own.upper, own.unit)
+        text = "; ".join(filter(None, (interval, own.bounded)))
+        shown, good = labels.quantity(own.true, own.unit), own.verdict is Verdict.HOLDS
+        yield Tile(own.goal, shown, within=text, good=good)
 
 
 def simulated(one: Results) -> list[list[str]]:
@@ -178,20 +162,14 @@ def simulated(one: Results) -> list[list[str]]:
 
 def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
     """The largest force of the stored responses: one run each, without an interval."""
-    names = (_readable(best), "original" if base is not None else "")
-    kept = [content.responses.get(name) for name in names]
-    known = [None if one is None else one.get("peak_contact_force") for one in kept]
-    forces = [np.nan if one is None else float(np.nanmax(one.to_numpy())) for one in known]
+    names = (best.text("design"), "original" if base is not None else "")
+    kept = [content.responses.get(name, Results({})) for name in names]
+    known = [one.get("peak_contact_force") for one in kept]
+    forces = [np.nan if one is None else float(np.nanmax(one.values)) for one in known]
     if np.isfinite(forces[0]):
-        moved = change((forces[0], np.nan, np.nan), (forces[1], np.nan, np.nan))
+        moved = change(*((force, np.nan, np.nan) for force in forces))
         value, old = labels.quantities(forces, "N")
         yield Tile("peak force", value, old.strip("–"), moved[0], "one run", moved[1])
-
-
-def _constraints(best: Results) -> Iterator[Results]:
-    if "constraint_verdict" in best:
-        every = (best.isel(constraint=k) for k in range(best.sizes["constraint"]))
-        yield from (own for own in every if int(own["constraint_verdict"]) != ABSENT)
 
 
 def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
@@ -210,138 +188,100 @@ def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
 
 def _spans(best: Results, base: Results | None) -> dict[str, Span]:
     """Where the variables of a design lie in their ranges, by name; none where the scene does not say."""
-    scene = scene_in(str(best.attrs.get("scene", "")))
+    scene = scene_of(best)
     if scene is None:
         return {}
+    varied = scene.study.names if scene.study is not None else ()
+    known = [str(v.name) for v in labels.design_variables(best) if np.isfinite(float(v))]
+    names = [name for name in known if name in varied]
+    designs = [{n: float(one[n]) for n in names} for one in (best if base is None else base, best)]
     try:
-        known = scene.study.names if scene.study is not None else ()
-        designs = [
-            {
-                name: float(one[name])
-                for v in labels.design_variables(best)
-                if (name := str(v.name)) in known and np.isfinite(float(v))
-            }
-            for one in (best if base is None else base, best)
-        ]
         before, after = (np.clip(shares(scene, design), 0.0, 1.0) for design in designs)
     except InputError:
         return {}
-    return {
-        name: Span(float(low), float(high), bound_at(high))
-        for name, low, high in zip(designs[0], before, after, strict=True)
-    }
+    ends = zip(names, before, after, strict=True)
+    return {name: Span(float(low), float(high), bound_at(high)) for name, low, high in ends}
 
 
 def _remark(of: Recommended) -> str:
     """Whether other designs are as good."""
-    twins = alike.others(of.ours, of.best)
-    spans = alike.spans(of.ours, of.best, twins, 1) if twins else ""
-    more = spans and f" ({spans})"
-    return f"{len(twins) + 1} equivalent designs{more}: choose by cost." if twins else ""
-
-
-def _missed(best: Results) -> str:
-    return str(best["accuracy_missed"].item()) if "accuracy_missed" in best else ""
+    if not (twins := alike.others(of.ours, of.best)):
+        return ""
+    spans = alike.spans(of.ours, of.best, twins, 1)
+    return f"{len(twins) + 1} equivalent designs{spans and f' ({spans})'}: choose by cost."
 
 
 def _trust(of: Recommended) -> Iterator[Trust]:
     best = of.best
-    for own in _constraints(best):
-        verdict = Verdict(int(own["constraint_verdict"]))
-        level = Level.GREEN if verdict is Verdict.HOLDS else Level.RED
-        price = float(own["constraint_price"])
-        more = f"; about {price:.0f} simulations would decide" if np.isfinite(price) else ""
-        more += f"; {OPEN}" if np.isinf(price) else ""
-        yield Trust(
-            level, f"Constraint {WORDS[verdict]}: {own['constraint_goal'].item()}{more}", "designs"
-        )
+    for own in constraints_of(best):
+        level = Trust.green if own.verdict is Verdict.HOLDS else Trust.red
+        more = own.deciding and f"; {own.deciding}"
+        yield level(f"Constraint {WORDS[own.verdict]}: {own.goal}{more}", "designs")
     share = beyond_hertz(best)
     if share > MANY:
-        level = Level.RED if share > MOST else Level.AMBER
+        level = Trust.red if share > MOST else Trust.amber
         runs = "all runs" if share == 1.0 else f"{100 * share:.0f} % of runs"
         why = bearings.outside(of.files["verification"]) or "contact model outside its range"
-        yield Trust(level, f"{why[0].upper()}{why[1:]} ({runs})", "bearings")
+        yield level(f"{upper(why)} ({runs})", "bearings")
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
-        moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
+        moved = of.files["chaos"]["chaotic"].values > scatter.SOME
         many = "" if moved.all() else f" in {int(moved.sum())} of {moved.size} designs"
-        yield Trust(Level.AMBER, f"Chaotic motion{many}: values are means", "quality")
+        yield Trust.amber(f"Chaotic motion{many}: values are means", "quality")
     yield from _failures(of)
-    errors = surrogate_errors(best)
-    if any(abs(error) > FAR for error in errors):
-        yield Trust(
-            Level.AMBER,
-            "Surrogate error above 20 %: a better design may have been missed",
-            "sensitivities",
-        )
+    place = "sensitivities"
+    if any(abs(error) > FAR for error in answer.surrogate_errors(best)):
+        yield Trust.amber("Surrogate error above 20 %: a better design may have been missed", place)
     if (half := scatter.half_width(of.files.get("sensitivity"))) > scatter.UNSURE:
-        yield Trust(
-            Level.AMBER, f"Sobol indices ± {100 * half:.0f} %: ranking only", "sensitivities"
-        )
-    poor = [
-        one
-        for kind in ("sensitivity", "kriging")
-        for one in fits.warnings(kind, of.files.get(kind))
-    ]
-    if poor:
-        yield Trust(Level.AMBER, f"{len(poor)} surrogate fits are poor", "sensitivities")
+        yield Trust.amber(f"Sobol indices ± {100 * half:.0f} %: ranking only", place)
+    kinds = ("sensitivity", "kriging")
+    if poor := sum(len(fits.warnings(kind, of.files.get(kind))) for kind in kinds):
+        yield Trust.amber(f"{poor} surrogate fits are poor", place)
 
 
 def _accuracy(best: Results) -> Trust:
     """The half-widths of mean and standard deviation, and whether they are those that were requested."""
-    if missed := _missed(best):
-        return Trust(Level.RED, f"Requested accuracy not reached: {missed}", "quality")
-    scene = scene_in(str(best.attrs.get("scene", "")))
+    if missed := best.text("accuracy_missed"):
+        return Trust.red(f"Requested accuracy not reached: {missed}", "quality")
+    scene = scene_of(best)
     asked = scene.study.accuracy if scene is not None and scene.study is not None else None
     if asked is not None and "accuracy_missed" in best:
-        return Trust(Level.GREEN, "Requested accuracy reached", "quality")
+        return Trust.green("Requested accuracy reached", "quality")
     known = []
     for stem in ("mean", "deviation"):
         value, low, high = _ends(best, stem)
         if value and np.isfinite([low, high]).all():
             known.append(f"{_USUAL[stem]} {percent((high - low) / 2.0 / abs(value))}")
     if not known:
-        return Trust(
-            Level.AMBER, "Intervals of mean and standard deviation are not known", "quality"
-        )
-    return Trust(Level.GREEN, f"Accuracy: {', '.join(known)}", "quality")
+        return Trust.amber("Intervals of mean and standard deviation are not known", "quality")
+    return Trust.green(f"Accuracy: {', '.join(known)}", "quality")
 
 
 def _failures(of: Recommended) -> Iterator[Trust]:
     best, samples = of.best, of.files.get("samples")
     failed = int(best["failed"]) if "failed" in best else 0
     if failed:
-        yield Trust(
-            Level.AMBER,
-            f"{failed} of {int(best['samples'])} simulations of this design failed",
-            "quality",
-        )
-    lost = 0 if samples is None else int((samples["status"].to_numpy() != Status.OK).sum())
-    if lost:
-        yield Trust(Level.AMBER, f"{lost} of {samples.sizes['sample']} samples failed", "quality")  # type: ignore[union-attr]
+        text = f"{failed} of {int(best['samples'])} simulations of this design failed"
+        yield Trust.amber(text, "quality")
+    status = np.zeros(0) if samples is None else samples["status"].values
+    if lost := int((status != Status.OK).sum()):
+        yield Trust.amber(f"{lost} of {len(status)} samples failed", "quality")
     if not failed and not lost:
-        yield Trust(Level.GREEN, "No simulation failed", "quality")
+        yield Trust.green("No simulation failed", "quality")
 
 
 def _bars(of: Recommended) -> tuple[list[ShareBar], str]:
     """Contributions to the variance of the recommended design; where these are not known, total Sobol indices."""
     own, found = of.of_best("contributions"), of.files.get("sensitivity")
-    if own is not None and np.isfinite(own["contribution"].to_numpy()).any():
+    if own is not None and np.isfinite(own["contribution"].values).any():
         return list(map(ShareBar._make, scatter.shares(own))), "".join(scatter.tighten(own))
-    if found is not None and "sobol_total" in found:
-        rows = zip(
-            *(found[name].to_numpy() for name in ("parameter", "sobol_total", "sobol_total_error")),
-            strict=True,
-        )
-        bars = [
-            ShareBar(str(n), float(v), scatter.HALF_WIDTH * float(e))
-            for n, v, e in rows
-            if np.isfinite(v)
-        ]
-        return sorted(
-            bars, key=lambda one: -one.share
-        ), "Total Sobol indices over the ranges of the study."
-    return [], ""
-
-
-SCREENS = (screen,)
+    if found is None or "sobol_total" not in found:
+        return [], ""
+    values = (found[name].values for name in ("sobol_total", "sobol_total_error"))
+    bars = [
+        ShareBar(name, float(share), scatter.HALF_WIDTH * float(error))
+        for name, share, error in zip(found.texts("parameter"), *values, strict=True)
+        if np.isfinite(share)
+    ]
+    words = "Total Sobol indices over the ranges of the study."
+    return sorted(bars, key=lambda one: -one.share), words

@@ -188,10 +188,10 @@ def _mean_over_steps(scene: Scene, response: Results) -> Array:
     if int(response["status"]) != Status.OK:
         return np.array(np.nan)
     turn = 2.0 * np.pi * scene.numerics.transient_revolutions
-    steady = response["crank_angle"].to_numpy() >= turn
-    distance = np.hypot(
-        response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy()
-    )[steady]
+    steady = response["crank_angle"].values >= turn
+    distance = np.hypot(response["eccentricity_x"].values, response["eccentricity_y"].values)[
+        steady
+    ]
     clearance = [scene.number(f"joints.{joint}.clearance") for joint in JOINTS]
     return np.array(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
 
