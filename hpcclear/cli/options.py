@@ -24,15 +24,6 @@ if TYPE_CHECKING:
 
 PATH = click.Path(path_type=Path, readable=False)  # an unreadable file is reported where it is read
 FILE = click.argument("file", type=PATH)
-SET = click.option(
-    "--set",
-    "overrides",
-    multiple=True,
-    metavar="KEY.PATH=VALUE",
-    help="Override an entry of the file. Repeatable.",
-)
-
-
 ENDINGS = ("", ".nc", ".nc4", ".cdf", ".netcdf", ".h5", ".hdf5")
 """Endings of names of result files: what is written is NetCDF-4, which is HDF5."""
 
@@ -51,14 +42,28 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
 
 def output_option(words: str, required: bool = True) -> Callable[[FC], FC]:
     """The option that names the file that results go to."""
-    return click.option(
-        "-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name
-    )
+    return option("-o --output", words, type=PATH, required=required, callback=_netcdf_name)
 
 
 def directory_option(words: str) -> Callable[[FC], FC]:
     """The option that names the directory that results go to."""
-    return click.option("-o", "--output", type=PATH, required=True, help=words)
+    return option("-o --output", words, type=PATH, required=True)
+
+
+def option(usage: str, words: str, shown: Any = None, **more: Any) -> Callable[[FC], FC]:
+    """An option as its usage has it, such as "--size LENGTH"; repeatable where its words say so.
+
+    `shown`: a default that the help prints. Further arguments: of `click.option`, and `name`, of the command's parameter where
+    that is another one.
+    """
+    names = [word for word in usage.split() if word.startswith("-")]
+    metavar = next((word for word in usage.split() if word not in names), None)
+    names += [more.pop("name")] if "name" in more else []
+    if shown is not None:
+        more |= {"default": shown, "show_default": True}
+    if "Repeatable." in words:
+        more["multiple"] = True
+    return click.option(*names, metavar=metavar, help=words, **more)
 
 
 def flag(name: str, words: str) -> Callable[[FC], FC]:
@@ -81,31 +86,20 @@ class Amount(click.FloatRange):
 
 TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
-LIMIT = click.option(
-    "--time-limit",
+SET = option("--set KEY.PATH=VALUE", "Override an entry of the file. Repeatable.", name="overrides")
+LIMIT = option(
+    "--time-limit SECONDS", "Stop after this time. The same command resumes.",
     type=Amount(min=0.0, min_open=True),
-    metavar="SECONDS",
-    help="Stop after this time. The same command resumes.",
+)  # fmt: skip
+INTERVAL = option(
+    "--checkpoint-interval SECONDS", "Save finished samples this often; a crash loses about this much simulation time.",
+    5.0, type=Amount(min=0.0), name="interval",
+)  # fmt: skip
+POINTS = option(
+    "--points", "CSV table of designs, used instead of the designs of the study.", type=PATH
 )
-INTERVAL = click.option(
-    "--checkpoint-interval",
-    "interval",
-    type=Amount(min=0.0),
-    default=5.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Save finished samples this often; a crash loses about this much simulation time.",
-)
-POINTS = click.option(
-    "--points", type=PATH, help="CSV table of designs, used instead of the designs of the study."
-)
-PROGRESS = click.option(
-    "--progress",
-    type=click.Choice(["auto", "bar", "log", "quiet"]),
-    default="auto",
-    show_default=True,
-    help="Display of progress.",
-)
+_STYLES = click.Choice(["auto", "bar", "log", "quiet"])
+PROGRESS = option("--progress", "Display of progress.", "auto", type=_STYLES)
 
 
 class Written(NamedTuple):
@@ -192,8 +186,8 @@ def detailed() -> bool:
     return context is not None and bool(context.meta.get(DETAILED))
 
 
-DETAILS = click.option(
-    "--details", is_flag=True, expose_value=False, callback=_note, help="Print all results, not the first screen only."
+DETAILS = option(
+    "--details", "Print all results, not the first screen only.", is_flag=True, expose_value=False, callback=_note
 )  # fmt: skip
 
 

@@ -10,26 +10,22 @@ from hpcclear.ranks.stopping import Exit
 
 @cli.command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
 @cli.with_scene
-@click.option("-o", "--output", type=cli.PATH, help="Directory for accuracy.nc and the figures.")
+@cli.option("-o --output", "Directory for accuracy.nc and the figures.", type=cli.PATH)
 @cli.flag("--quick", "Measure with fewer points, in about a minute.")
 @cli.FRESH
 @cli.LIMIT
 @cli.flag(
     "--plan", "Estimate core-hours and wall time of a run instead, and print its Slurm options."
 )
-@click.option(
-    "--error",
+@cli.option(
+    "--error RELATIVE",
+    "With --plan, target error of the objective, relative. By default the settings of the file are used.",
     type=cli.Amount(0.0, 0.5, min_open=True),
-    metavar="RELATIVE",
-    help="With --plan, target error of the objective, relative. By default the settings of the file are used.",
 )
-@click.option(
-    "--ranks",
-    "workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="With --plan, number of ranks to plan for. By default those of this run.",
-)
+@cli.option(
+    "--ranks N", "With --plan, number of ranks to plan for. By default those of this run.",
+    name="workers", type=click.IntRange(min=1),
+)  # fmt: skip
 def run(
     written: cli.Written,
     output: Path | None,

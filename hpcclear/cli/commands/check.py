@@ -1,7 +1,7 @@
 """`check`: whether a scene is valid, what would be simulated, and how long a sample takes."""
 
-import contextlib
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import click
@@ -14,12 +14,10 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("start", "Validate an input file and estimate run time.", ranks=True)
 @cli.with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
-@click.option(
-    "--sketch",
+@cli.option(
+    "--sketch FIGURE", "Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
     type=cli.PATH,
-    metavar="FIGURE",
-    help="Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
-)
+)  # fmt: skip
 @cli.DETAILS
 def run(written: cli.Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
@@ -32,12 +30,8 @@ def run(written: cli.Written, cost: bool, sketch: Path | None) -> int:
 
     from hpcclear.ranks.boundary import alone
 
-    launched = is_launched()
-    with (
-        cli.on_ranks(ahead=(), resumes=False)
-        if launched
-        else contextlib.nullcontext(alone()) as ranks
-    ):
+    here = cli.on_ranks(ahead=(), resumes=False) if is_launched() else nullcontext(alone())
+    with here as ranks:
         from hpcclear.scene import load_scene
 
         scene = load_scene(*written)

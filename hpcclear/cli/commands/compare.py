@@ -20,21 +20,15 @@ MOST = 16
 @cli.command("look", "Compare a response with measurements.")
 @click.argument("file", type=cli.PATH)
 @click.argument("measured", type=cli.PATH)
-@click.option("-o", "--output", type=cli.PATH, help="Draw both to this file (png, svg, pdf).")
-@click.option(
-    "--align",
-    type=click.Choice(["auto", "angle", "correlation", "none"]),
-    default="auto",
-    show_default=True,
-    help="Alignment in phase. By default by angle if the table has one, else by the largest correlation.",
-)
-@click.option(
-    "--name",
-    "names",
-    multiple=True,
-    metavar="COLUMN=QUANTITY",
-    help="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
-)
+@cli.option("-o --output", "Draw both to this file (png, svg, pdf).", type=cli.PATH)
+@cli.option(
+    "--align", "Alignment in phase. By default by angle if the table has one, else by the largest correlation.",
+    "auto", type=click.Choice(["auto", "angle", "correlation", "none"]),
+)  # fmt: skip
+@cli.option(
+    "--name COLUMN=QUANTITY", name="names",
+    words="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
+)  # fmt: skip
 @cli.DETAILS
 def run(file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]) -> int:
     """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
@@ -91,11 +85,9 @@ def _norms(one: "ComparedSignal") -> list[tuple[str, str]]:
         return f"{norms[name] * unit.factor:+.4g} {unit.unit}"
 
     least, most = (pick(one.by_revolution) * unit.factor for pick in (min, max))
+    share = f"{norms['relative_rms']:.3g} of the measured RMS"
     return [
-        (
-            "RMS error",
-            f"{shown('rms').lstrip('+')}, {norms['relative_rms']:.3g} of the measured RMS",
-        ),
+        ("RMS error", f"{shown('rms').lstrip('+')}, {share}"),
         ("RMS error by revolution", f"{least:.4g} to {most:.4g} {unit.unit}"),
         ("largest error", shown("largest").lstrip("+")),
         ("error of the mean", shown("mean")),

@@ -13,28 +13,19 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("compute", "Find effects that can be neglected.", ranks=True)
 @cli.with_scene
 @cli.output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
-@click.option(
-    "--tolerance",
-    default="1%",
-    show_default=True,
-    metavar="CHANGE",
-    help="Largest relative change of the results that counts as negligible.",
+@cli.option(
+    "--tolerance CHANGE", "Largest relative change of the results that counts as negligible.", "1%"
 )
-@click.option(
-    "--samples",
+@cli.option(
+    "--samples N",
+    "Largest number of samples of a variant. By default a twentieth of the study's simulations is spent.",
     type=click.IntRange(min=64),
-    metavar="N",
-    help="Largest number of samples of a variant. By default a twentieth of the study's simulations is spent.",
 )
 @cli.flag(
     "--forces", "Apply the tolerance to peak contact forces too. Without it they are only reported."
 )
-@click.option(
-    "--scene",
-    "reduced",
-    type=cli.PATH,
-    metavar="FILE",
-    help="Write the recommended scene to this file.",
+@cli.option(
+    "--scene FILE", "Write the recommended scene to this file.", name="reduced", type=cli.PATH
 )
 @cli.with_how
 def run(
@@ -63,14 +54,9 @@ def run(
         allowed = tolerance_of(tolerance)
         if reduced is not None:
             cli.check_free(reduced)
-        most, budget = certificate_extent(scene, samples)
-        found = run_effects(
-            scene,
-            cli.place_of(output or Path(f"{written.file.stem}-effects.nc")),
-            ranks,
-            how.options(),
-            Wanted(allowed, most, budget, forces),
-        )
+        wanted = Wanted(allowed, *certificate_extent(scene, samples), forces)
+        place = cli.place_of(output or Path(f"{written.file.stem}-effects.nc"))
+        found = run_effects(scene, place, ranks, how.options(), wanted)
         describe_run(found, "effects")
         if reduced is not None:
             from hpcclear.results import files

@@ -12,22 +12,15 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("keep", "Write results as a table for Excel, MATLAB or pandas.")
 @click.argument("files", type=cli.PATH, nargs=-1, required=True, metavar="FILE...")
 @cli.directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
-@click.option(
-    "--unit",
-    "units",
-    multiple=True,
-    metavar="UNIT",
-    help='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
-)
+@cli.option(
+    "--unit UNIT", name="units",
+    words='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
+)  # fmt: skip
 @cli.flag(
-    "--statistics",
-    "Write statistics of samples instead: for each file columns of value and interval.",
-)
-@click.option(
-    "--beyond",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="With --statistics, share of samples beyond this value. Repeatable.",
+    "--statistics", "Write statistics of samples instead: for each file columns of value and interval."
+)  # fmt: skip
+@cli.option(
+    "--beyond NAME=VALUE", "With --statistics, share of samples beyond this value. Repeatable."
 )
 def run(
     files: tuple[Path, ...],
@@ -55,7 +48,12 @@ def run(
         table = writing.statistics(samples, cli.place_of(output), lines, units)
         console().print(tabled("", rows_of(lines), ["statistic", *samples]))
     else:
-        _check_one(files, beyond)
+        if len(files) > 1 or beyond:
+            reason, remedy = (
+                "a table holds one result",
+                "Add --statistics, or export each by itself",
+            )
+            raise InputError("export", f"{len(files)} files", reason, remedy)
         table = writing.export(files[0], cli.place_of(output), units)
         if left := list(table.attrs["left_out"]):
             more = f" and {len(left) - 3} more" if len(left) > 3 else ""
@@ -63,11 +61,3 @@ def run(
             cli.say(f"Note: left out, with too many columns for a table: {named} (in {files[0]})")
     cli.show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
     return Exit.DONE
-
-
-def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
-    if len(files) > 1 or beyond:
-        reason = "a table holds one result"
-        raise InputError(
-            "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
-        )

@@ -12,51 +12,39 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("compute", "Identify clearances from a measured signal.", ranks=True)
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@click.option(
-    "--unknown", multiple=True, required=True, metavar="PATH=LO:HI",
-    help="Entry to identify and its bounds. Repeatable.",
+@cli.option("--unknown PATH=LO:HI", "Entry to identify and its bounds. Repeatable.", required=True)
+@cli.option(
+    "--signal", "Measured table: time or crank angle, then signals. Repeatable, one for each date.",
+    multiple=True, type=cli.PATH,
 )  # fmt: skip
-@click.option(
-    "--signal", multiple=True, type=cli.PATH,
-    help="Measured table: time or crank angle, then signals. Repeatable, one for each date.",
+@cli.option(
+    "--of SIGNAL", shown=("crank_moment",),
+    words="Signal to use: a series of a response, frame_force_x, acceleration_x BODY.POINT, impacts JOINT. Repeatable.",
 )  # fmt: skip
-@click.option(
-    "--of", multiple=True, default=("crank_moment",), show_default=True, metavar="SIGNAL",
-    help="Signal to use: a series of a response, frame_force_x, acceleration_x BODY.POINT, impacts JOINT. Repeatable.",
+@cli.option("--date YYYY-MM-DD", "Date of each signal, in their order.", multiple=True)
+@cli.option("--limit VALUE", "Value of the unknowns; the time until it is reached is printed.")
+@cli.option("--band LO:HI", "Frequencies that the sensor passes, in Hz.")
+@cli.option("--resonance HZ[:Q]", "Mounting resonance of the sensor and its quality factor.")
+@cli.option(
+    "--gain-error SHARE", "Standard deviation of the sensor's calibration factor, relative.",
+    type=cli.Amount(min=0.0), default=0.0,
 )  # fmt: skip
-@click.option(
-    "--date", multiple=True, metavar="YYYY-MM-DD", help="Date of each signal, in their order."
+@cli.option(
+    "--angle-error ANGLE", "Standard deviation of the crank-angle reference.", default="0 deg"
 )
-@click.option(
-    "--limit",
-    metavar="VALUE",
-    help="Value of the unknowns; the time until it is reached is printed.",
-)
-@click.option("--band", metavar="LO:HI", help="Frequencies that the sensor passes, in Hz.")
-@click.option(
-    "--resonance", metavar="HZ[:Q]", help="Mounting resonance of the sensor and its quality factor."
-)
-@click.option(
-    "--gain-error", type=cli.Amount(min=0.0), default=0.0, metavar="SHARE",
-    help="Standard deviation of the sensor's calibration factor, relative.",
+@cli.option(
+    "--noise SHARE", type=cli.Amount(min=0.0, min_open=True),
+    words="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
+          "revolutions is used too.",
 )  # fmt: skip
-@click.option(
-    "--angle-error", default="0 deg", metavar="ANGLE",
-    help="Standard deviation of the crank-angle reference.",
-)  # fmt: skip
-@click.option(
-    "--noise", type=cli.Amount(min=0.0, min_open=True), metavar="SHARE",
-    help="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
-         "revolutions is used too.",
-)  # fmt: skip
-@click.option(
-    "--pressure", default="", metavar="COLUMN=AREA",
-    help="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
+@cli.option(
+    "--pressure COLUMN=AREA", default="",
+    words="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
 )  # fmt: skip
 @cli.flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
-@click.option(
-    "--members", type=click.IntRange(min=32), metavar="N",
-    help="Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
+@cli.option(
+    "--members N", "Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
+    type=click.IntRange(min=32),
 )  # fmt: skip
 @cli.with_how
 def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> int:

@@ -16,28 +16,21 @@ from hpcclear.ranks.stopping import Exit
     "A four-stroke engine, written as a linkage; its gas force repeats every two turns of the crank.",
 )
 @cli.flag(
-    "--compressor",
-    "A piston compressor with fits by ISO 286, and a sample of machines as they are made.",
-)
+    "--compressor", "A piston compressor with fits by ISO 286, and a sample of machines as they are made."
+)  # fmt: skip
 @cli.flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
-@click.option(
-    "--import",
-    "imports",
-    is_flag=True,
-    help="A linkage from SOURCE: a table of points, a drawing, or a file of another program.",
-)
-@click.option(
-    "--unit",
-    default="",
-    metavar="UNIT",
-    help="Of lengths, where the source states none, such as mm. It overrides the unit of a DXF drawing, which is noted.",
-)
-@click.option(
-    "--sketch",
+@cli.option(
+    "--import", "A linkage from SOURCE: a table of points, a drawing, or a file of another program.",
+    name="imports", is_flag=True,
+)  # fmt: skip
+@cli.option(
+    "--unit UNIT", default="",
+    words="Of lengths, where the source states none, such as mm. It overrides the unit of a DXF drawing, which is noted.",
+)  # fmt: skip
+@cli.option(
+    "--sketch FIGURE", "Draw the imported linkage with names, axes and signs to this file (png, svg, pdf).",
     type=cli.PATH,
-    metavar="FIGURE",
-    help="Draw the imported linkage with names, axes and signs to this file (png, svg, pdf).",
-)
+)  # fmt: skip
 def run(
     source: tuple[Path, ...],
     file: Path,
@@ -76,9 +69,8 @@ def run(
     elif jobs:
         _copy_jobs(file)
     else:
-        _write_starter(
-            file, "four_stroke" if four_stroke else "compressor" if compressor else "starter"
-        )
+        name = "four_stroke" if four_stroke else "compressor" if compressor else "starter"
+        _write_starter(file, name)
     return Exit.DONE
 
 
@@ -106,9 +98,8 @@ def _copy_jobs(place: Path) -> None:
             target = place / path.relative_to(source)
             target.parent.mkdir(parents=True, exist_ok=True)
             files.write_bytes(target, path.read_bytes())
-    cli.show(
-        f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
-    )
+    cli.show(f"written  {len(found)} files in {place}")
+    cli.show(f"next     hpcclear check {place / 'quickstart.toml'}")
 
 
 def _import(source: Path, file: Path, unit: str, sketch: Path | None) -> None:

@@ -11,47 +11,25 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@click.option(
-    "--x",
-    "x",
-    required=True,
-    metavar="PATH=LO:HI:N",
-    help="First parameter: scene entry, bounds, number of cells.",
+@cli.option(
+    "--x PATH=LO:HI:N", "First parameter: scene entry, bounds, number of cells.", required=True
 )
-@click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second parameter.")
+@cli.option("--y PATH=LO:HI:N", "Second parameter.")
 @cli.flag(
     "--bifurcation", "Observe one value of each revolution instead, for a bifurcation diagram."
 )
-@click.option(
-    "--observe",
-    "name",
-    default="objective",
-    show_default=True,
-    metavar="SERIES",
-    help='With --bifurcation, series of a response, taken at the section: "contact_force crank_rod". With max, min or mean '
-    'before it, that value of each revolution: "max contact_force crank_rod".',
+@cli.option(
+    "--observe SERIES", shown="objective", name="name",
+    words='With --bifurcation, series of a response, taken at the section: "contact_force crank_rod". With max, min or mean '
+          'before it, that value of each revolution: "max contact_force crank_rod".',
+)  # fmt: skip
+@cli.option(
+    "--section ANGLE", "Crank angle at which the series is taken, in rad or with a unit.", "0 deg"
 )
-@click.option(
-    "--section",
-    default="0 deg",
-    show_default=True,
-    metavar="ANGLE",
-    help="Crank angle at which the series is taken, in rad or with a unit.",
+@cli.option(
+    "--transient", "Revolutions before the first one that is observed.", 60, type=click.IntRange(0)
 )
-@click.option(
-    "--transient",
-    type=click.IntRange(min=0),
-    default=60,
-    show_default=True,
-    help="Revolutions before the first one that is observed.",
-)
-@click.option(
-    "--revolutions",
-    type=click.IntRange(min=1),
-    default=60,
-    show_default=True,
-    help="Revolutions that are observed.",
-)
+@cli.option("--revolutions", "Revolutions that are observed.", 60, type=click.IntRange(min=1))
 @cli.with_how
 def run(
     written: cli.Written,

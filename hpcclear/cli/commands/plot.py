@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -22,75 +22,35 @@ One = TypeVar("One")
 
 @cli.command("look", "Draw figures and films of results.")
 @click.argument("places", nargs=-1, required=True, metavar="PLACE...", type=cli.PATH)
-@click.option(
-    "--figure",
-    "names",
-    multiple=True,
-    metavar="NAME",
-    help="Figure to draw. Repeatable. Default: all. Without -o the names are listed.",
+@cli.option(
+    "--figure NAME", "Figure to draw. Repeatable. Default: all. Without -o the names are listed.",
+    name="names",
+)  # fmt: skip
+@cli.option(
+    "-o --output", "File for one figure (png, svg, pdf), otherwise a directory.", type=cli.PATH
 )
-@click.option(
-    "-o",
-    "--output",
-    type=cli.PATH,
-    help="File for one figure (png, svg, pdf), otherwise a directory.",
-)
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["png", "svg", "pdf"]),
-    default="png",
-    show_default=True,
-    help="Format of figures in a directory.",
-)
-@click.option(
-    "--design",
-    "designs",
-    multiple=True,
-    metavar="NAME",
-    help="Design of which responses are drawn. Repeatable. Default: all, beside each other.",
-)
-@click.option(
-    "--size", default="", metavar="LENGTH", help="Width, 85mm, or both sides, '85mm x 60mm'."
-)
-@click.option("--font", default="", metavar="NAME", help="Installed font of words and formulas.")
-@click.option(
-    "--label",
-    "texts",
-    multiple=True,
-    metavar="NAME=TEXT",
-    help="Words for an axis, by its entry of the scene, variable or former words. Repeatable. The unit stays.",
-)
-@click.option(
-    "--style", "sheet", type=cli.PATH, metavar="FILE", help="Style sheet of matplotlib (.mplstyle)."
-)
-@click.option(
-    "--theme",
-    type=click.Choice(["light", "dark"]),
-    default="light",
-    show_default=True,
-    help="Colours of page and curves.",
-)
-@click.option(
-    "--animation",
-    type=cli.PATH,
-    metavar="FILE",
-    help="Film of the motion: .gif, or .mp4 with ffmpeg.",
-)
-@click.option(
-    "--seconds",
-    type=cli.Amount(min=0.0),
-    default=6.0,
-    show_default=True,
-    help="Length of the film.",
-)
-@click.option(
-    "--revolutions",
+@cli.option(
+    "--format", "Format of figures in a directory.", "png",
+    type=click.Choice(["png", "svg", "pdf"]), name="kind",
+)  # fmt: skip
+@cli.option(
+    "--design NAME", "Design of which responses are drawn. Repeatable. Default: all, beside each other.",
+    name="designs",
+)  # fmt: skip
+@cli.option("--size LENGTH", "Width, 85mm, or both sides, '85mm x 60mm'.", default="")
+@cli.option("--font NAME", "Installed font of words and formulas.", default="")
+@cli.option(
+    "--label NAME=TEXT", name="texts",
+    words="Words for an axis, by its entry of the scene, variable or former words. Repeatable. The unit stays.",
+)  # fmt: skip
+@cli.option("--style FILE", "Style sheet of matplotlib (.mplstyle).", name="sheet", type=cli.PATH)
+@cli.option("--theme", "Colours of page and curves.", "light", type=click.Choice(["light", "dark"]))
+@cli.option("--animation FILE", "Film of the motion: .gif, or .mp4 with ffmpeg.", type=cli.PATH)
+@cli.option("--seconds", "Length of the film.", 6.0, type=cli.Amount(min=0.0))
+@cli.option(
+    "--revolutions", "Revolutions in the film, the last ones of the response.", 2,
     type=click.IntRange(min=1),
-    default=2,
-    show_default=True,
-    help="Revolutions in the film, the last ones of the response.",
-)
+)  # fmt: skip
 @cli.TRUST
 def run(
     places: tuple[Path, ...],
@@ -98,15 +58,12 @@ def run(
     output: Path | None,
     kind: str,
     designs: tuple[str, ...],
-    size: str,
-    font: str,
     texts: tuple[str, ...],
-    sheet: Path | None,
-    theme: str,
     animation: Path | None,
     seconds: float,
     revolutions: int,
     trust: bool,
+    **look: Any,
 ) -> int:
     """Draw figures of result files or of a directory of results, and films of the motion. Figures of responses show several
     designs: those of a directory, or of several files.
@@ -132,7 +89,7 @@ def run(
             if animation is None:
                 cli.show(f"figures of {', '.join(map(str, places))}: {', '.join(every)}")
             return Exit.DONE
-        with printing(size, font, sheet, theme, dict(map(_label, texts))):
+        with printing(texts=dict(map(_label, texts)), **look):
             drawn = _drawn(chosen, bool(names))
         _save(drawn, output, kind)
     return Exit.DONE

@@ -10,12 +10,8 @@ from hpcclear.ranks.stopping import Exit
 
 @cli.command("look", "Write figures and an HTML page.")
 @click.argument("places", type=cli.PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
-@click.option(
-    "-o", "--output", type=cli.PATH, help="Page to write. Default: report.html beside the results."
-)
-@click.option(
-    "--sheet", is_flag=True, help="Write one sheet of A4 to sign (sheet.pdf) instead of the page."
-)
+@cli.option("-o --output", "Page to write. Default: report.html beside the results.", type=cli.PATH)
+@cli.flag("--sheet", "Write one sheet of A4 to sign (sheet.pdf) instead of the page.")
 @cli.TRUST
 def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool) -> int:
     """Write figures and a self-contained HTML page from a directory of results, or from chosen files.

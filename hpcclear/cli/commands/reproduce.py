@@ -10,12 +10,8 @@ from hpcclear.ranks.stopping import Exit
 
 @cli.command("keep", "Repeat simulations bit by bit; describe results for an archive.")
 @click.argument("place", type=cli.PATH)
-@click.option(
-    "--samples",
-    type=click.IntRange(1),
-    default=16,
-    show_default=True,
-    help="Number of samples to repeat of each file.",
+@cli.option(
+    "--samples", "Number of samples to repeat of each file.", 16, type=click.IntRange(min=1)
 )
 @cli.TRUST
 @cli.flag(

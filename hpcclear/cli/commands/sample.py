@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import click
-
 from hpcclear.base.errors import InputError
 from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
@@ -17,24 +15,19 @@ from hpcclear.ranks.stopping import Exit
     "--statistics",
     "Keep mean, standard deviation and histogram of Monte Carlo samples instead of the samples.",
 )
-@click.option(
-    "--raw",
+@cli.option(
+    "--raw", "With --statistics: keep the samples too, in this directory, a file for every 4096.",
     type=cli.PATH,
-    help="With --statistics: keep the samples too, in this directory, a file for every 4096.",
-)
-@click.option(
-    "--part",
-    metavar="K/N",
-    help="Simulate part K of N, for a job array. Each part has its own file; --merge joins them.",
+)  # fmt: skip
+@cli.option(
+    "--part K/N",
+    "Simulate part K of N, for a job array. Each part has its own file; --merge joins them.",
 )
 @cli.flag("--merge", "Merge the files of all parts into one, equal to the file of a single run.")
-@click.option(
-    "--beyond",
-    "thresholds",
-    multiple=True,
-    metavar="[RESULT=]VALUE",
-    help='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
-)
+@cli.option(
+    "--beyond [RESULT=]VALUE", name="thresholds",
+    words='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
+)  # fmt: skip
 @cli.with_how
 def run(
     written: cli.Written,

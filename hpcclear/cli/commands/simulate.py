@@ -11,11 +11,8 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("compute", "Simulate one design.")
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@click.option(
-    "--keep",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Store the time series of the last N revolutions only.",
+@cli.option(
+    "--keep N", "Store the time series of the last N revolutions only.", type=click.IntRange(1)
 )
 def run(written: cli.Written, output: Path, keep: int | None) -> int:
     """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
