@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results, Variable, each
+from hpcclear.results.content import Results, Variable, each, text_in, texts_in
 
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
@@ -26,7 +26,7 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
         return ""  # there is no recommended design
     least = float(merit.min())
     near = np.isfinite(merit) & (merit - least <= FLAT * abs(least))
-    own = [*again(ours, best), best.text("design")]
+    own = [*again(ours, best), text_in(best, "design")]
     names = [str(name) for name in ours["design"].values[near] if str(name) not in own]
     if not names:
         return ""
@@ -64,7 +64,7 @@ def others(ours: Results, best: Results) -> list[str]:
         return []
     same = [
         *again(ours, best),
-        *(one.text("design") for one in each(ours, "design") if not satisfies(one)),
+        *(text_in(one, "design") for one in each(ours, "design") if not satisfies(one)),
     ]
     return [name for name in _twins(ours, best) if name not in same]
 
@@ -91,7 +91,7 @@ def again(ours: Results, best: Results) -> list[str]:
         own = float(best[variable.name])
         alike &= np.isclose(variable.values, own, rtol=1e-9, atol=0.0, equal_nan=True)
     names = (str(name) for name in ours["design"].values[alike])
-    return [name for name in names if name != best.text("design")]
+    return [name for name in names if name != text_in(best, "design")]
 
 
 def _overlaps(ours: Results, best: Results, word: str) -> np.ndarray:
@@ -101,8 +101,8 @@ def _overlaps(ours: Results, best: Results, word: str) -> np.ndarray:
 
 def _twins(ours: Results, best: Results) -> list[str]:
     """As the file states, else those whose confidence intervals overlap."""
-    names = ours.texts("design")
-    own = best.text("design")
+    names = texts_in(ours, "design")
+    own = text_in(best, "design")
     if "equivalence" in ours:
         stated = best["rival"].values[best["equivalence"].values == 1]
         return [name for name in names if name in stated]

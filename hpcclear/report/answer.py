@@ -9,7 +9,7 @@ from hpcclear.report.constraints import constraints_of, worded
 from hpcclear.report.merit import best_of, judged, merit, ours_of
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, number_in, text_in
 
 MANY = 0.05
 """Share of samples outside the range of Hertz contact above which that is the first of the next steps."""
@@ -41,9 +41,9 @@ def beyond_hertz(best: Results) -> float:
 def _head(of: Recommended) -> Iterator[Line]:
     """Why the design is recommended, the verdicts on its constraints, and designs that are nearly as good."""
     ours, best = of.ours, of.best
-    case = best.text("case") or "of the study"
+    case = text_in(best, "case") or "of the study"
     count = ours.sizes["design"]
-    name = best.text("design")
+    name = text_in(best, "design")
     text = f"{name}: {merit(ours, best)} of {count} simulated designs, case {case}"
     yield Line("criterion", text)
     yield from (Line("constraint", text) for text in worded(best))
@@ -58,7 +58,7 @@ def unit_of(one: Results, name: str) -> str:
 
 
 def _sure(of: Recommended) -> Iterator[Line]:
-    missed = of.best.text("accuracy_missed")
+    missed = text_in(of.best, "accuracy_missed")
     more = missed and f". Requested accuracy not reached: {missed}"
     yield Line("confidence", f"{confidence(of.best)}{more}")
 
@@ -74,7 +74,7 @@ def confidence(best: Results) -> str:
         text += f"{more} for its probabilities of failure"
     if np.isfinite(level):
         covered = "sampling error only"
-        if np.isfinite(best.number("mean_tolerance")):
+        if np.isfinite(number_in(best, "mean_tolerance")):
             covered = "sampling error and the error of the tolerance as far as pairs show it"
         text += f"; {100 * level:.0f} % confidence intervals, which cover {covered}"
     return text
@@ -82,7 +82,7 @@ def confidence(best: Results) -> str:
 
 def surrogate_errors(best: Results) -> list[float]:
     """Return relative errors of the surrogate's mean and standard deviation, as far as they are known."""
-    found = (best.number(f"{word}_error") for word in ("mean", "deviation"))
+    found = (number_in(best, f"{word}_error") for word in ("mean", "deviation"))
     return [error for error in found if np.isfinite(error)]
 
 
@@ -97,7 +97,7 @@ def _steps(of: Recommended) -> Iterator[str]:
     elif prices:
         key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
         yield f"study.verification.{key}={max(prices):.0f} to decide the constraints"
-    if best.text("on_bounds"):
+    if text_in(best, "on_bounds"):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in surrogate_errors(best)):
         yield "a larger study.samples, since the surrogate error is large and a better design may have been missed"

@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.outcome import Flag
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import scene_of
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 ROUNDING = 1e-12
 """Of the largest torque: a smaller mean is zero but for rounding."""
@@ -59,7 +59,7 @@ def bearings(response: Results) -> list[Bearing]:
     inside = averaged(response)
     areas = _projected_areas(response)
     found = []
-    for k, joint in enumerate(response.texts("joint")):
+    for k, joint in enumerate(texts_in(response, "joint")):
         peak, gap = (_known(response, name, k) for name in ("peak_contact_force", "mean_gap"))
         if gap == peak == 0.0:
             continue  # an ideal joint of a slider-crank
@@ -157,7 +157,7 @@ def _gaining(response: Results) -> list[str]:
     return [
         f"the impacts in {joint} gain energy, {labels.quantity(-float(lost[k]), 'J')} in a revolution: "
         "the contact law is not physical. Check the sign of its damping"
-        for k, joint in enumerate(response.texts("joint"))
+        for k, joint in enumerate(texts_in(response, "joint"))
         if lost[k] + reach[k] < 0.0
     ]
 

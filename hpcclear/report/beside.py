@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike
 from hpcclear.report.merit import counts, recommended
-from hpcclear.results.content import Results, each
+from hpcclear.results.content import Results, each, text_in, texts_in
 
 LIGHTER = 0.01
 """Relative difference of the varied masses above which another design is called the lightest."""
@@ -36,7 +36,7 @@ def roles(verified: Results) -> dict[str, list[Role]]:
         Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses, unless one
         of these is as light. Intermediate designs of the search are left out.
     """
-    names = verified.texts("design")
+    names = texts_in(verified, "design")
     best = recommended(verified)
     found = {}
     for case in _cases(verified, names):
@@ -59,7 +59,7 @@ def roles(verified: Results) -> dict[str, list[Role]]:
 def _cases(verified: Results, names: list[str]) -> list[str]:
     """Cases, in the order of the file."""
     if "case" in verified:
-        return list(dict.fromkeys(verified.texts("case")))
+        return list(dict.fromkeys(texts_in(verified, "case")))
     ends = [name.rpartition(" ") for name in names]
     return list(dict.fromkeys(case for case, _, end in ends if end == "original"))
 
@@ -67,7 +67,7 @@ def _cases(verified: Results, names: list[str]) -> list[str]:
 def _same(verified: Results, own: Results, chosen: dict[str, list[str]]) -> str:
     """The chosen design with the same variables, else its own name."""
     twins = alike.again(verified, own)
-    return next((name for name in chosen if name in twins), own.text("design"))
+    return next((name for name in chosen if name in twins), text_in(own, "design"))
 
 
 def _role(end: str, own: Results) -> str:
@@ -86,9 +86,9 @@ def _lightest(verified: Results, case: str, chosen: list[str]) -> str:
     own = [
         one
         for one in each(verified, "design")
-        if counts(one) and one.text("design").startswith(f"{case} ") and alike.satisfies(one)
+        if counts(one) and text_in(one, "design").startswith(f"{case} ") and alike.satisfies(one)
     ]
-    weights = {one.text("design"): sum(map(float, alike.masses(one))) for one in own}
+    weights = {text_in(one, "design"): sum(map(float, alike.masses(one))) for one in own}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}
     if not known:
         return ""

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.verdict import Verdict, together
 from hpcclear.report.figures.labels import between, quantity
-from hpcclear.results.content import Results, each
+from hpcclear.results.content import Results, each, number_in, text_in
 
 ABSENT = 3
 """Code of ``constraint_verdict`` where a case has fewer constraints than another."""
@@ -57,8 +57,10 @@ def constraints_of(one: Results) -> list[Constraint]:
     for own in each(one, "constraint") if "constraint_verdict" in one else ():
         if (code := int(own["constraint_verdict"])) != ABSENT:
             names = ("true", "lower", "upper", "most", "price")
-            true, lower, upper, most, price = (own.number(f"constraint_{name}") for name in names)
-            words = own.text("constraint_goal"), own.text("constraint_unit")
+            true, lower, upper, most, price = (
+                number_in(own, f"constraint_{name}") for name in names
+            )
+            words = text_in(own, "constraint_goal"), text_in(own, "constraint_unit")
             found.append(Constraint(*words, true, lower, upper, most, Verdict(code), price))
     return found
 

@@ -6,7 +6,7 @@ from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results, each
+from hpcclear.results.content import Results, each, number_in, text_in, texts_in
 
 SPAN = 2.0
 """Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
@@ -20,7 +20,7 @@ def recommended(verified: Results) -> str:
 
 def goals_of(one: Results) -> list[str]:
     """Objectives of the case of a design, where the file has them: "first", "second", and further ones."""
-    return [name for name in ORDINALS if f"{name}_goal" in one and one.text(f"{name}_goal")]
+    return [name for name in ORDINALS if f"{name}_goal" in one and text_in(one, f"{name}_goal")]
 
 
 def leading_goals(verified: Results) -> list[str]:
@@ -28,7 +28,7 @@ def leading_goals(verified: Results) -> list[str]:
     if not any(map(counts, each(verified, "design"))):
         return []
     first = ours_of(verified).isel(design=0)
-    return [first.text(f"{name}_goal") for name in goals_of(first)]
+    return [text_in(first, f"{name}_goal") for name in goals_of(first)]
 
 
 def usual_of(one: Results, name: str) -> Usual:
@@ -48,7 +48,7 @@ def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k, one in enumerate(each(verified, "design")) if counts(one)]
     if "case" in verified:
-        cases = verified.texts("case")
+        cases = texts_in(verified, "case")
         chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
         rows = [k for k in rows if cases[k] == chosen]
     return verified.isel(design=rows)
@@ -67,7 +67,7 @@ def counts(one: Results) -> bool:
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
     every = each(ours, "design")
-    return next((d for d in every if d.text("design").split(" ")[-1] == "original"), None)
+    return next((d for d in every if text_in(d, "design").split(" ")[-1] == "original"), None)
 
 
 def best_of(ours: Results) -> Results:
@@ -94,11 +94,11 @@ def merit(ours: Results, best: Results) -> str:
     """What `judged` goes by, in words."""
     if is_plain(best):
         return f"lowest mean + {SPAN:g} standard deviations of f"
-    words, found = f"lowest {best.text('first_goal')}", verdict_of(best)
+    words, found = f"lowest {text_in(best, 'first_goal')}", verdict_of(best)
     if found is Verdict.FAILS:
         return "smallest violation of the constraints"
     if found is Verdict.UNDECIDED:
-        inside = best.number("constraint_excess") <= 0.0
+        inside = number_in(best, "constraint_excess") <= 0.0
         return (
             f"{words} where estimates satisfy the constraints,"
             if inside

@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
@@ -19,7 +19,7 @@ def joints(response: Results) -> list[list[str]]:
     """Return a row of `HEADER` for each joint with clearance; none where the response has no measures of impact."""
     if "impact_energy" not in response:
         return []
-    names = response.texts("joint")
+    names = texts_in(response, "joint")
     found = []
     for joint in (one.joint for one in bearings.bearings(response)):
         at = names.index(joint)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from hpcclear.report.html.content import Content
 from hpcclear.report.spread import Line
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, text_in
 from hpcclear.results.names import KINDS
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Recommended(NamedTuple):
 
     def of_best(self, kind: str) -> Results | None:
         """What a file with a row for each design says of the recommended one; None where it says nothing."""
-        found, name = self.files.get(kind), self.best.text("design")
+        found, name = self.files.get(kind), text_in(self.best, "design")
         known = found is not None and name in found["design"].values
         return found.sel(design=name) if found is not None and known else None
 

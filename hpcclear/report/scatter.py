@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, number_in, texts_in
 
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
@@ -67,7 +67,7 @@ def tighten(own: Results) -> Iterator[str]:
     names, falls, errors, rows = _inputs(own, "halved")
     prices = own["halving_cost"].values[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
-        joint = [own.number(f"halved_together{end}") for end in ("", "_error")]
+        joint = [number_in(own, f"halved_together{end}") for end in ("", "_error")]
         yield _first(names, falls, errors, prices, joint)
 
 
@@ -157,11 +157,11 @@ def _indices(of: Recommended) -> Iterator[Line]:
     total, error = (found[f"sobol_total{end}"].values for end in ("", "_error"))
     if not total.size or not np.isfinite([total, error]).all():
         return
-    names = found.texts("parameter")
+    names = texts_in(found, "parameter")
     parts = [(name, v, HALF_WIDTH * e) for name, v, e in zip(names, total, error, strict=True)]
     words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
     yield Line("interactions", f"{words}: {_listed(parts)}")
-    noise, doubt = (found.number(f"sobol_noise{end}") for end in ("", "_error"))
+    noise, doubt = (number_in(found, f"sobol_noise{end}") for end in ("", "_error"))
     if noise > HALF_WIDTH * doubt and noise > LITTLE:
         text = f"{share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
         yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")

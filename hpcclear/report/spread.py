@@ -17,7 +17,7 @@ from hpcclear.base.student import student
 from hpcclear.base.units import to_si
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.study_tables import DRAWN
@@ -204,7 +204,7 @@ def side_by_side(
     found = {}
     for name, samples in every.items():
         units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}
-        joints = samples.texts("joint")
+        joints = texts_in(samples, "joint")
         levels = [beyond(units, words, joints) for words in thresholds]
         count = samples.sizes["sample"]
         lines = [Line("samples", str(count), StatedValue(count)), *statistics(samples, levels)]

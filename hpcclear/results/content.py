@@ -95,11 +95,9 @@ def place_of(known: np.ndarray, wanted: Any) -> Place:
 class Results:
     """Variables by their names, and global attributes. A variable that is called as its dimension is a coordinate.
 
-    Its methods but `text`, `number` and `texts` are called as those of a dataset of xarray and do the same.
-
-    `sizes`: of the dimensions, in the order in which the variables have them; `labels`: coordinates, of a dimension that a
-    selection took away the label that was chosen. Raises ValueError where two variables do not agree on the size of a
-    dimension.
+    Its methods are called as those of a dataset of xarray and do the same. `sizes`: of the dimensions, in the order in which
+    the variables have them; `labels`: coordinates, of a dimension that a selection took away the label that was chosen.
+    Raises ValueError where two variables do not agree on the size of a dimension.
     """
 
     def __init__(
@@ -164,18 +162,6 @@ class Results:
         """Return a variable, or the default where this name is missing."""
         return self.variables.get(name, default)
 
-    def text(self, name: str) -> str:
-        """Return the only value of a variable as text; "" where this name is missing."""
-        return str(self.variables[name].item()) if name in self.variables else ""
-
-    def number(self, name: str) -> float:
-        """Return the only value of a variable as a number; NaN where this name is missing."""
-        return float(self.variables[name]) if name in self.variables else np.nan
-
-    def texts(self, name: str) -> list[str]:
-        """Return the values (n,) of a variable as texts, such as the labels of a dimension."""
-        return [str(one) for one in self.variables[name].values]
-
     def __contains__(self, name: object) -> bool:
         return name in self.variables
 
@@ -186,3 +172,18 @@ class Results:
 def each(content: Results, dim: str) -> list[Results]:
     """Return what stands at each place along a dimension."""
     return [content.isel({dim: k}) for k in range(content.sizes[dim])]
+
+
+def text_in(content: Results, name: str) -> str:
+    """Return the only value of a variable as text; "" where this name is missing."""
+    return str(content[name].item()) if name in content else ""
+
+
+def number_in(content: Results, name: str) -> float:
+    """Return the only value of a variable as a number; NaN where this name is missing."""
+    return float(content[name]) if name in content else np.nan
+
+
+def texts_in(content: Results, name: str) -> list[str]:
+    """Return the values (n,) of a variable as texts, such as the labels of a dimension."""
+    return [str(one) for one in content[name].values]

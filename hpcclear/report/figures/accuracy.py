@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 MARGIN = 100.0
 """Errors count as resolved from this many times the reference's own error on."""
@@ -58,7 +58,7 @@ def _plain(axis: "style.Axes") -> None:
 @style.drawn
 def integration_figure(accuracy: Results) -> "style.Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
-    quantities = accuracy.texts("quantity")
+    quantities = texts_in(accuracy, "quantity")
     figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
     for row, quantity in enumerate(quantities):
         here = accuracy.sel(quantity=quantity)
@@ -201,7 +201,7 @@ def parallel_figure(accuracy: Results) -> "style.Figure":
     style.key(left)
     lost = accuracy["lost_seconds"].values
     right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.colour("sky"))
-    right.set_yticks(np.arange(len(lost)), accuracy.texts("loss"))
+    right.set_yticks(np.arange(len(lost)), texts_in(accuracy, "loss"))
     right.set(xlabel="lost (core-seconds)", ylabel="time lost to (what)")
     _foot(figure, accuracy, f"{accuracy.attrs.get('batch', '')}.")
     return figure

@@ -10,7 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results, each
+from hpcclear.results.content import Results, each, text_in, texts_in
 
 
 @style.drawn
@@ -28,7 +28,7 @@ def front_figure(front: Results, verification: Results | None = None) -> "style.
     verification : xarray.Dataset, optional
         Kind ``verification``: its designs are drawn with confidence intervals, joined to what the surrogate said.
     """
-    cases = front.texts("case")
+    cases = texts_in(front, "case")
     asked = {case: _goals(front.sel(case=case)) for case in cases}
     pairs = [(case, x, y) for case in cases for x, y in itertools.combinations(asked[case], 2)]
     alike = all(x.label == pairs[0][1].label for _, x, _ in pairs)
@@ -86,7 +86,7 @@ def searched(one: Results) -> dict[str, tuple[str, str]]:
     """Words and unit of what a case makes small, from its part of the fronts (kind ``front``), by the variable; none where that
     is mean and standard deviation."""
     names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
-    every = {n: (one.text(f"{n}_goal"), one.text(f"{n}_unit")) for n in names}
+    every = {n: (text_in(one, f"{n}_goal"), text_in(one, f"{n}_unit")) for n in names}
     return {name: row for name, row in every.items() if row[0]}
 
 
@@ -122,7 +122,7 @@ def _verified(
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
     for one in each(verification, "design"):
         label, marker = _mark(one)
-        if ("case" in one and one.text("case") != case) or not (all_designs or marker == "o"):
+        if ("case" in one and text_in(one, "case") != case) or not (all_designs or marker == "o"):
             continue
         at = _place(one, x, y, "true")
         bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
@@ -151,7 +151,7 @@ def _ends(
     """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
-    names = verification.texts("design")
+    names = texts_in(verification, "design")
     sides = _SIDES if count > 2 else _SIDES[:1] * count
     if count > 2:
         panel.margins(0.15)  # room for letters beside marks at the border
@@ -176,7 +176,7 @@ def _mark(one: Results) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
         return "paper (simulated)", "D"
-    if one.text("design").rpartition(" ")[2] == "original":
+    if text_in(one, "design").rpartition(" ")[2] == "original":
         return "baseline (simulated)", "s"
     return "optimised (simulated)", "o"
 

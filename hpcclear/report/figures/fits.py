@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hpcclear.report.figures import style
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 LOW = 0.9
 """R2 on test points below which a surrogate is called indicative, as `study.sensitivity.r2` has it by default."""
@@ -20,7 +20,7 @@ def of_surfaces(sensitivity: Results) -> dict[str, float]:
 
 def of_models(kriging: Results) -> dict[str, float]:
     """Return R2 of each Kriging model, of its worst part (kind ``kriging``)."""
-    family = kriging.texts("family")
+    family = texts_in(kriging, "family")
     r2 = kriging["r2"].values
     return {name: float(np.min(r2[np.array(family) == name])) for name in dict.fromkeys(family)}
 

@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 
 class Touch(NamedTuple):
@@ -53,7 +53,7 @@ def guide_figure(response: Results) -> "style.Figure":
             "Give a slide a clearance, length, height and corner_radius",
         )  # fmt: skip
     shown = motion.latest(response)
-    turn, guides = motion.turns(shown), shown.texts("guide")
+    turn, guides = motion.turns(shown), texts_in(shown, "guide")
     figure, axes = style.grid(3, 1, 110.0, sharex=True)
     for panel, name in zip(axes[:2, 0], ("guide_offset", "guide_tilt"), strict=True):
         unit = labels.of(shown[name])

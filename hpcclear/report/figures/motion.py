@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results, Variable, text_in
 
 TURN = 2.0 * np.pi
 
@@ -129,7 +129,7 @@ def followed(response: Results) -> tuple[Variable, Variable]:
     if not speed.values.any():
         word = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].values)))
         speed = last[f"body_v{word}"]
-    name, place = last.text("body"), last[f"body_{word}"]
+    name, place = text_in(last, "body"), last[f"body_{word}"]
     place.attrs["long_name"], speed.attrs["long_name"] = f"{word} of {name}", f"speed of {name}"
     return place, speed
 

@@ -6,7 +6,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS
 from hpcclear.report.figures import motion
 from hpcclear.report.figures.placed import Pose
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, text_in, texts_in
 from hpcclear.scene import Scene
 
 Drawn = tuple[list[list[int]], Array, Array]
@@ -41,7 +41,7 @@ def poses(scene: Scene, shown: Results, k: int) -> dict[str, Pose]:
     if "rod_x" not in shown:
         held = [one.isel(body=b) for b in range(shown.sizes["body"])]
         entries = ("body_x", "body_y", "body_angle")
-        return {b.text("body"): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
+        return {text_in(b, "body"): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
     phi, crank = float(one["crank_angle"]), scene.linkage.bodies[0].own_center[0]
     aside, tilt = (
         float(one[name].values[0]) if name in shown else 0.0
@@ -65,7 +65,7 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     rod = np.column_stack([shown["rod_x"].values, shown["rod_y"].values])
     phi, theta = shown["crank_angle"].values, shown["rod_angle"].values
     crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
-    names = shown.texts("joint")
+    names = texts_in(shown, "joint")
     near_pin, far_pin = (
         e[:, names.index(name)] if name in names else np.zeros_like(rod) for name in JOINTS
     )
@@ -89,7 +89,9 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
 
 def _linkage(shown: Results) -> Drawn:
     names = [str(point).partition(".")[0] for point in shown["point"].values]
-    bodies = [[k for k, name in enumerate(names) if name == body] for body in shown.texts("body")]
+    bodies = [
+        [k for k, name in enumerate(names) if name == body] for body in texts_in(shown, "body")
+    ]
     points = np.stack([shown["point_x"].values, shown["point_y"].values], axis=-1)
     angles = shown["body_angle"].values
     # without the whole turns before, which would cost digits

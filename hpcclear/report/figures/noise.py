@@ -6,7 +6,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.noise import band_name
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results, Variable, texts_in
 
 FALL = 80.0
 """Levels that are further below the highest are not shown, dB."""
@@ -64,7 +64,7 @@ def _forces(response: Results) -> dict[str, tuple[Variable, Variable, Variable, 
     found = {}
     if "frame_force_level" in response:
         found["force on the frame"] = tuple(response[f"frame_force_{end}"] for end in ends)
-    for joint in response.texts("joint"):
+    for joint in texts_in(response, "joint"):
         own = tuple(response[f"contact_force_{end}"].sel(joint=joint) for end in ends)
         if float(np.max(own[-1])) > 0.0:
             found[joint.replace("_", " ")] = own

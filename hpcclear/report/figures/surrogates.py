@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 if TYPE_CHECKING:
     from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -21,7 +21,7 @@ def sensitivity_figure(sensitivity: Results) -> "style.Figure":
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
     changing and is determined, with its uncertainty.
     """
-    surfaces = sensitivity.texts("surface")
+    surfaces = texts_in(sensitivity, "surface")
     rows = (len(surfaces) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True, sharey=True)
     unit = labels.of(sensitivity["sensitivity"])
@@ -67,7 +67,7 @@ def _sensitivity_panel(
 @style.drawn
 def fit_figure(sensitivity: Results) -> "style.Figure":
     """Fit of the response surfaces (kind ``sensitivity``) against clearance, a curve for each interval (the paper's Fig. 7)."""
-    surfaces = sensitivity.texts("surface")
+    surfaces = texts_in(sensitivity, "surface")
     figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
     across = labels.of(sensitivity["clearance"])
     clearance = across(sensitivity["clearance"])
@@ -110,7 +110,7 @@ def sobol_figure(sensitivity: Results) -> "style.Figure":
         reason = "the study did not compute Sobol indices"
         remedy = "Set it to a power of two and run again"
         raise InputError("sensitivity.sobol_samples", 0, reason, remedy)
-    names = sensitivity.texts("parameter")
+    names = texts_in(sensitivity, "parameter")
     figure, axes = style.grid(1, 1, 22.0 + 7.0 * len(names))
     panel = axes[0, 0]
     order = np.argsort(np.nan_to_num(sensitivity["sobol_total"].values), kind="stable")

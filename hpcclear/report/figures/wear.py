@@ -5,14 +5,14 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 
 @style.drawn
 def fan_figure(wear: Results) -> "style.Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
     (kind ``wear``)."""
-    joints = wear.texts("joint")
+    joints = texts_in(wear, "joint")
     figure, axes = style.grid(len(joints) + 1, 1, 30.0 + 45.0 * (len(joints) + 1))
     cycles = wear["cycle"].values
     rows = [(wear, "objective", "objective $f$")]

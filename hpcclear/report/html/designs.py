@@ -12,7 +12,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, number
 from hpcclear.report.merit import is_plain
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, text_in, texts_in
 
 SIMULATED = (
     ("mean_true", "mean of f"),
@@ -45,7 +45,7 @@ def designs(verified: Results, content: Content) -> list[object]:
 
 def names_in(verified: Results) -> list[str]:
     """Return the names of all designs."""
-    return verified.texts("design")
+    return texts_in(verified, "design")
 
 
 def table_of(
@@ -83,8 +83,8 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
         return []
     cells: list[object] = []
     for name in names:
-        value = labels.quantity(float(one[f"{name}_true"]), one.text(f"{name}_unit"))
-        words = one.text(f"{name}_goal")
+        value = labels.quantity(float(one[f"{name}_true"]), text_in(one, f"{name}_unit"))
+        words = text_in(one, f"{name}_goal")
         cells.append(f"{words}: {value}" if words else "")
     return [*cells, "; ".join(worded(one)) or "none"]
 

@@ -8,7 +8,7 @@ from hpcclear.report.figures import curves, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable, download, number, preformatted
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, text_in
 
 _PARTS = {"busy": "computing", "idle": "waiting", "compile": "compiling", "write": "writing"}
 """What a rank spends time on, variables of kind ``timing``, in words."""
@@ -69,7 +69,7 @@ def reproduce(content: Content) -> list[object]:
     found = content.get("timing")
     steps: list[object] = []
     if found is not None:
-        steps += ["The command that made these results:", preformatted(found.text("command"))]
+        steps += ["The command that made these results:", preformatted(text_in(found, "command"))]
     words = "`hpcclear reproduce` with this directory simulates some results again and compares, bit for bit."
     items = {label: content.attribute(name) for label, name in _ITEMS.items()}
     rows = [[label, text] for label, text in items.items() if text]

@@ -8,7 +8,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.designs import SIMULATED, table_of
 from hpcclear.report.html.markup import PageTable, number
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import each
+from hpcclear.results.content import each, text_in
 
 _BADGES = {
     Verdict.HOLDS: {"words": "✓ holds", "kind": "holds"},
@@ -43,7 +43,7 @@ def claims(content: Content) -> list[object] | None:
     counts = [verdicts.count(verdict) for verdict in Verdict]
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
     rows = [
-        [f"{int(one['claim'])}. {one.text('text')}", _BADGES[Verdict(int(one["verdict"]))]]
+        [f"{int(one['claim'])}. {text_in(one, 'text')}", _BADGES[Verdict(int(one["verdict"]))]]
         for one in each(found, "claim")
     ]
     title = "Claims of the paper; claims.nc has the numbers that decide"
@@ -56,7 +56,7 @@ def designs_of_a_paper(content: Content) -> list[object]:
     if verified is None or "mean_paper" not in verified:
         return []
     printed = {
-        one.text("design"): one for one in each(verified, "design") if labels.is_printed(one)
+        text_in(one, "design"): one for one in each(verified, "design") if labels.is_printed(one)
     }
     words = (
         "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "

@@ -10,7 +10,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 from hpcclear.report.merit import goals_of, leading_goals, recommended
 from hpcclear.report.screens.study import simulated
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, text_in
 
 _LEGEND = {"design": "simulated", "original": "baseline design", "printed": "design of the paper"}
 _USUAL = ("mean of f", "standard deviation of f")
@@ -114,8 +114,8 @@ def _ends(one: Results, name: str) -> tuple[()] | tuple[float, float]:
 def _verified(one: Results) -> dict[str, Goal]:
     """What the case of a design makes small, by simulation: unit and value by its words."""
     return {
-        one.text(f"{name}_goal"): (
-            one.text(f"{name}_unit") or "1",
+        text_in(one, f"{name}_goal"): (
+            text_in(one, f"{name}_unit") or "1",
             float(one[f"{name}_true"]),
             *_ends(one, name),
         )
@@ -125,7 +125,7 @@ def _verified(one: Results) -> dict[str, Goal]:
 
 def _design(one: Results) -> dict[str, Any]:
     """A design that was simulated directly."""
-    name = one.text("design")
+    name = text_in(one, "design")
     is_original = name.rpartition(" ")[2] == "original"
     surrogate = (
         _moments(one, "mean_surrogate", "deviation_surrogate") if "mean_surrogate" in one else []
@@ -133,7 +133,7 @@ def _design(one: Results) -> dict[str, Any]:
     return {
         "kind": "printed" if labels.is_printed(one) else "original" if is_original else "design",
         "name": name,
-        "case": one.text("case"),
+        "case": text_in(one, "case"),
         "design": _values(one),
         "surrogate": surrogate,
         "direct": simulated(one),

@@ -12,7 +12,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content, scene_of
 from hpcclear.report.html.markup import Number, PageTable, preformatted
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 from hpcclear.scene.loading import parse
 
 LISTED = 40  # samples listed by number before the rest is only counted
@@ -33,7 +33,7 @@ def screened(found: Results, content: Content) -> list[object]:
 def _changes(found: Results, seconds: effects.Times) -> PageTable:
     """A row a variant: what is off, changes with confidence intervals, time, verdict."""
     shown = np.flatnonzero(np.isfinite(found["change"][1:]).any(axis=0))
-    words, every = {"mean": "mean f", "deviation": "std. dev."}, found.texts("response")
+    words, every = {"mean": "mean f", "deviation": "std. dev."}, texts_in(found, "response")
     names = (words.get(every[k], every[k]) for k in shown)
     header = ["off", *names, "run time saved", "within"]
     rows: list[list[object]] = []

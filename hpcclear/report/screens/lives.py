@@ -11,7 +11,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
 from hpcclear.report.screen import Screen, ScreenRow, ShareBar, Tile, Trust, trusted, upper
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
 
 HOUR = 3600.0
@@ -171,7 +171,7 @@ def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
     """Each joint with its new and final clearance, medians, and the range of the final one, "" where it has none."""
     rows = []
     at_end = quantiles(lives["end_clearance"].values, np.array([0.05, 0.5, 0.95]))
-    for k, name in enumerate(lives.texts("joint")):
+    for k, name in enumerate(texts_in(lives, "joint")):
         new = float(np.nanmedian(lives["clearance"].isel(cycle=0).sel(joint=name)))
         low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
         rows.append((name, quantity(new, "m"), middle, f"{low} to {high}" if low != high else ""))
@@ -243,7 +243,7 @@ def _profiles(lives: Results) -> list[list[object]]:
 
 def _inputs(lives: Results) -> Iterator[tuple[str, str, float]]:
     """The random input that decides most how fast each joint wears: joint, input, squared rank correlation."""
-    for joint in lives.texts("joint"):
+    for joint in texts_in(lives, "joint"):
         share = lives["rank_correlation"].sel(joint=joint).values ** 2
         if len(share) and np.isfinite(share).any():
             k = int(np.nanargmax(share))

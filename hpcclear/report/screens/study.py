@@ -31,7 +31,7 @@ from hpcclear.report.screen import (
     upper,
     within,
 )
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, number_in, text_in, texts_in
 from hpcclear.scene.domain import bound_at, shares
 
 MOST = 0.5
@@ -53,7 +53,7 @@ def screen(verified: Results, content: Content) -> Screen | None:
     ours = ours_of(verified)
     best, base = best_of(ours), baseline_of(ours)
     of = Recommended(content.files, ours, best)
-    kept = base is not None and base.text("design") == best.text("design")
+    kept = base is not None and text_in(base, "design") == text_in(best, "design")
     today = None if kept else base
     tiles = list(_tiles(best, today, content))
     bars, causes = _bars(of)
@@ -94,7 +94,7 @@ def _doubt(of: Recommended) -> str:
         found.append("the contact model is outside its range")
     if verdict_of(of.best) is Verdict.UNDECIDED:
         found.append("constraints are undecided")
-    if of.best.text("accuracy_missed"):
+    if text_in(of.best, "accuracy_missed"):
         found.append("the requested accuracy was not reached")
     return "; ".join(found)
 
@@ -111,7 +111,7 @@ def _about(of: Recommended) -> Iterator[str]:
 def _ends(one: Results, stem: str) -> tuple[float, float, float]:
     """A simulated value and the ends of its interval, NaN where they are not known."""
     value = float(one[stem if stem in one else f"{stem}_true"])
-    return value, one.number(f"{stem}_lower"), one.number(f"{stem}_upper")
+    return value, number_in(one, f"{stem}_lower"), number_in(one, f"{stem}_upper")
 
 
 def _statistics(best: Results) -> dict[str, str]:
@@ -119,7 +119,7 @@ def _statistics(best: Results) -> dict[str, str]:
     asked = [] if is_plain(best) else goals_of(best)
     usual = {Usual.MEAN: "mean", Usual.DEVIATION: "deviation"}
     shown = {usual.get(usual_of(best, name), name) for name in asked}
-    found = {best.text(f"{name}_goal"): name for name in asked}
+    found = {text_in(best, f"{name}_goal"): name for name in asked}
     for stem, words in _USUAL.items():
         if stem not in shown and (stem in best or f"{stem}_true" in best):
             found.setdefault(f"{words} of f", stem)
@@ -162,7 +162,7 @@ def simulated(one: Results) -> list[list[str]]:
 
 def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
     """The largest force of the stored responses: one run each, without an interval."""
-    names = (best.text("design"), "original" if base is not None else "")
+    names = (text_in(best, "design"), "original" if base is not None else "")
     kept = [content.responses.get(name, Results({})) for name in names]
     known = [one.get("peak_contact_force") for one in kept]
     forces = [np.nan if one is None else float(np.nanmax(one.values)) for one in known]
@@ -241,7 +241,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
 
 def _accuracy(best: Results) -> Trust:
     """The half-widths of mean and standard deviation, and whether they are those that were requested."""
-    if missed := best.text("accuracy_missed"):
+    if missed := text_in(best, "accuracy_missed"):
         return Trust.red(f"Requested accuracy not reached: {missed}", "quality")
     scene = scene_of(best)
     asked = scene.study.accuracy if scene is not None and scene.study is not None else None
@@ -280,7 +280,7 @@ def _bars(of: Recommended) -> tuple[list[ShareBar], str]:
     values = (found[name].values for name in ("sobol_total", "sobol_total_error"))
     bars = [
         ShareBar(name, float(share), scatter.HALF_WIDTH * float(error))
-        for name, share, error in zip(found.texts("parameter"), *values, strict=True)
+        for name, share, error in zip(texts_in(found, "parameter"), *values, strict=True)
         if np.isfinite(share)
     ]
     words = "Total Sobol indices over the ranges of the study."
