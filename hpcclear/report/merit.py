@@ -67,7 +67,7 @@ def counts(one: Results) -> bool:
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
     every = each(ours, "design")
-    return next((d for d in every if text_in(d, "design").split(" ")[-1] == "original"), None)
+    return next(filter(labels.is_baseline, every), None)
 
 
 def best_of(ours: Results) -> Results:

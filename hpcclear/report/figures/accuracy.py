@@ -25,11 +25,12 @@ _WORDS = {
 }
 
 
-def _foot(figure: "style.Figure", found: Results, *sentences: str) -> None:
-    """Where the numbers come from, below a figure."""
-    versions = str(found.attrs.get("versions", ""))
-    lines = [*sentences, str(found.attrs.get("processor", "")), versions]
-    figure.supxlabel(labels.literal("\n".join(lines)), x=0.02, ha="left", wrap=True)
+def _foot(figure: "style.Figure", found: Results, sentence: str = "", *about: str) -> None:
+    """Where the numbers come from, below a figure: a sentence, attributes of the file, and what made it."""
+    said = "; ".join(str(found.attrs.get(name, "")) for name in about)
+    lines = [sentence] * bool(sentence) + [f"{said}."] * bool(about)
+    made = [str(found.attrs.get(name, "")) for name in ("processor", "versions")]
+    figure.supxlabel(labels.literal("\n".join([*lines, *made])), x=0.02, ha="left", wrap=True)
 
 
 def _decades(axis: "style.Axis") -> None:
@@ -68,12 +69,8 @@ def integration_figure(accuracy: Results) -> "style.Figure":
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
     style.legend(figure, axes[0, 0], "upper")
-    _foot(
-        figure,
-        accuracy,
-        "Errors of the grey region, with hollow marks, are below 100 times the reference's own error.",
-        f"{accuracy.attrs.get('designs', '')}; {accuracy.attrs.get('repeats', '')}.",
-    )
+    grey = "Errors of the grey region, with hollow marks, are below 100 times the reference's own error."
+    _foot(figure, accuracy, grey, "designs", "repeats")
     return figure
 
 
@@ -113,11 +110,8 @@ def averaging_figure(accuracy: Results) -> "style.Figure":
     above = panel.secondary_xaxis("top", functions=(lambda x: x * turn, lambda t: t / turn))
     above.set_xlabel("core time of the averaged revolutions (ms)")
     _plain(above)
-    _foot(
-        figure,
-        accuracy,
-        f"{accuracy.attrs.get('copies', '')}, perturbed by 1e-10, half of them at a ten times tighter tolerance.",
-    )
+    text = "perturbed by 1e-10, half of them at a ten times tighter tolerance."
+    _foot(figure, accuracy, f"{accuracy.attrs.get('copies', '')}, {text}")
     return figure
 
 
@@ -157,10 +151,9 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
             one = here.sel(estimate=estimate)
             y = one["moment_error"].values
             bars = [y - one["moment_lower"].values, one["moment_upper"].values - y]
+            look = {"elinewidth": 0.6, "label": str(estimate), **style.look(k)}
             for column, x in enumerate((accuracy["draws"], one["moment_seconds"])):
-                axes[row, column].errorbar(
-                    x.values, y, bars, elinewidth=0.6, label=str(estimate), **style.look(k)
-                )
+                axes[row, column].errorbar(x.values, y, bars, **look)
         for panel in axes[row]:
             panel.set(xscale="log", yscale="log")
             panel.axhline(
@@ -177,12 +170,8 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
     for panel in axes.flat:
         _decades(panel.xaxis)
     style.legend(figure, axes[0, 1], "upper")
-    _foot(
-        figure,
-        accuracy,
-        "Bars: 95 % confidence; the bias is the surrogate's, by quadrature, against all simulations.",
-        f"{accuracy.attrs.get('study', '')}.",
-    )
+    text = "Bars: 95 % confidence; the bias is the surrogate's, by quadrature, against all simulations."
+    _foot(figure, accuracy, text, "study")
     return figure
 
 
@@ -203,7 +192,7 @@ def parallel_figure(accuracy: Results) -> "style.Figure":
     right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.colour("sky"))
     right.set_yticks(np.arange(len(lost)), texts_in(accuracy, "loss"))
     right.set(xlabel="lost (core-seconds)", ylabel="time lost to (what)")
-    _foot(figure, accuracy, f"{accuracy.attrs.get('batch', '')}.")
+    _foot(figure, accuracy, "", "batch")
     return figure
 
 
@@ -218,9 +207,12 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     best = float(accuracy["cheapest_tolerance"][np.abs(accuracy["aim"].values - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
         if rtol == best:
-            top.loglog(
-                seconds[k], model[k], color=style.colour("faint"), lw=5.0, solid_capstyle="round"
-            )
+            wide: style.Look = {
+                "color": style.colour("faint"),
+                "lw": 5.0,
+                "solid_capstyle": "round",
+            }
+            top.loglog(seconds[k], model[k], **wide)
         look = {**style.look(k), "ms": 2.8}
         top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
         top.plot(seconds[k], accuracy["spent_error"].values[k], **{**look, "ls": "none"})
@@ -240,12 +232,8 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     )
     bottom.invert_xaxis()
     style.legend(figure, top, "upper", title="relative tolerance")
-    _foot(
-        figure,
-        accuracy,
-        f"Marks: measured; lines: bias and variance over revolutions; grey: cheapest to {100 * AIM:.0f} %.",
-        f"{accuracy.attrs.get('motion', '')}.",
-    )
+    text = "Marks: measured; lines: bias and variance over revolutions"
+    _foot(figure, accuracy, f"{text}; grey: cheapest to {100 * AIM:.0f} %.", "motion")
     return figure
 
 
@@ -265,9 +253,8 @@ def total_figure(accuracy: Results) -> "style.Figure":
             1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.colour("vermilion"),
             mfc="none", label="your settings", zorder=4,
         )  # fmt: skip
-    box = (
-        panel.dataLim
-    )  # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
+    # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
+    box = panel.dataLim
     panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
     best_for: dict[targets.Way, list[str]] = {}
     for aim in targets.TARGETS:

@@ -126,13 +126,11 @@ class _Mechanism:
         axes.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
         axes.set_title(f"clearances enlarged {gain:g} times" if widest else "")
         look: style.Look = {"lw": 3.0, "ms": 4.0, "solid_capstyle": "round", "animated": True}
-        self._lines = [
-            axes.plot([], [], "o-", color=style.colour(k), **look)[0]
-            for k in range(len(self._bodies))
-        ]
-        for line, places in zip(self._lines, self._bodies, strict=True):
+        self._lines = []
+        for k, places in enumerate(self._bodies):
+            self._lines += axes.plot([], [], "o-", color=style.colour(k), **look)
             if len(places) == 1:
-                line.set(marker="s", markersize=11.0, alpha=0.5)
+                self._lines[-1].set(marker="s", markersize=11.0, alpha=0.5)
         radii = unit(np.nan_to_num(gain * known)) + 0.012 * size * unit.factor
         edge: style.Look = {"fill": False, "lw": 1.2, "ec": style.colour("ink"), "animated": True}
         self._rings = [Circle((0.0, 0.0), radius, **edge) for radius in radii]
@@ -197,8 +195,7 @@ def _mp4(pictures: Iterator[Array], program: str) -> bytes:
         content = b"".join(one[:height, :width].tobytes() for one in every)
         done = subprocess.run(words, input=content, capture_output=True, check=False)
         if done.returncode != 0:
-            reason = (
-                f"ffmpeg cannot write it ({done.stderr.decode(errors='replace')[-200:].strip()})"
-            )
+            said = done.stderr.decode(errors="replace")[-200:].strip()
+            reason = f"ffmpeg cannot write it ({said})"
             raise InputError("animation", ".mp4", reason, "Write a .gif, or install another ffmpeg")
         return target.read_bytes()

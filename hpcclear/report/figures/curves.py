@@ -110,10 +110,8 @@ def draw(
     left, width = across
     for number, curve in enumerate(curves):
         bottom = top - (number + 1) * height
-        axes = figure.add_axes(
-            (left + 0.17 * width, bottom + 0.42 * height, 0.79 * width, 0.42 * height)
-        )
-        _curve(axes, curve)
+        corner = left + 0.17 * width, bottom + 0.42 * height
+        _curve(figure.add_axes((*corner, 0.79 * width, 0.42 * height)), curve)
 
 
 def _curve(axes: "style.Axes", curve: Tabulated) -> None:

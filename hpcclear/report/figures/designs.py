@@ -109,11 +109,8 @@ def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
     for k, run in enumerate(one["run"].values):
         row = one.sel(run=run)
         points = [goal.scale(row[goal.searched]) for goal in (x, y)]
-        panel.plot(
-            *points,
-            label=f"predicted, run {run}",
-            **{**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0},
-        )
+        look = {**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0}
+        panel.plot(*points, label=f"predicted, run {run}", **look)
 
 
 def _verified(
@@ -122,7 +119,7 @@ def _verified(
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
     for one in each(verification, "design"):
         label, marker = _mark(one)
-        if ("case" in one and text_in(one, "case") != case) or not (all_designs or marker == "o"):
+        if text_in(one, "case") not in ("", case) or not (all_designs or marker == "o"):
             continue
         at = _place(one, x, y, "true")
         bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
@@ -131,12 +128,8 @@ def _verified(
             label=label, fmt=marker, ms=3.4, mfc=style.colour("paper"), mew=0.7, zorder=4,
         )  # fmt: skip
         if f"{x.verified}_surrogate" in one and f"{y.verified}_surrogate" in one:
-            panel.plot(
-                *zip(_place(one, x, y, "surrogate"), at, strict=True),
-                color=style.colour("ink"),
-                lw=0.5,
-                zorder=3,
-            )
+            ends = zip(_place(one, x, y, "surrogate"), at, strict=True)
+            panel.plot(*ends, color=style.colour("ink"), lw=0.5, zorder=3)
 
 
 def _place(one: Results, x: _Goal, y: _Goal, end: str) -> tuple[float, float]:
@@ -167,42 +160,29 @@ def _ends(
                 side = -side[0] - 5, side[1]
             drawn = panel.annotate(letter, at, side, textcoords="offset points")
             if count > 2:
-                drawn.set_path_effects(
-                    [withStroke(linewidth=1.5, foreground=style.colour("paper"))]
-                )
+                halo = withStroke(linewidth=1.5, foreground=style.colour("paper"))
+                drawn.set_path_effects([halo])
 
 
 def _mark(one: Results) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
         return "paper (simulated)", "D"
-    if text_in(one, "design").rpartition(" ")[2] == "original":
+    if labels.is_baseline(one):
         return "baseline (simulated)", "s"
     return "optimised (simulated)", "o"
 
 
 def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
     """Distances to the confidence intervals as `errorbar` wants them, (2, 1); None if there are none."""
-    if f"{name}_lower" not in one or f"{name}_upper" not in one:
-        return None
-    sides = [float(one[f"{name}_{side}"]) for side in ("lower", "upper")]
-    return np.abs(np.array(sides)[:, None] - float(one[f"{name}_true"])) * unit.factor
+    value, *ends = labels.estimate(one, name)
+    return np.abs(np.array(ends)[:, None] - value) * unit.factor if f"{name}_lower" in one else None
 
 
 @style.drawn
 def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
-    """Responses of designs over the last two revolutions, that of the baseline design first (the paper's Fig. 10).
-
-    Parameters
-    ----------
-    responses : mapping of str to xarray.Dataset
-        Kind ``response``, by the name of the design.
-
-    Raises
-    ------
-    InputError
-        No response at all.
-    """
+    """Responses (kind ``response``) of designs by their names, over the last two revolutions, that of the baseline design
+    first (the paper's Fig. 10). Raises InputError without any."""
     if not responses:
         reason = "there is no response to draw"
         raise InputError("responses", 0, reason, "Give the response of each design")

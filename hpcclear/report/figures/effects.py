@@ -66,9 +66,8 @@ def seconds_of(timing: Results | None) -> Times:
 
 def saving(content: Results, variant: int, seconds: Times) -> Saving:
     """What a variant saves: measured in pairs with the whole scene, else by evaluations."""
-    here, whole = (
-        np.array(seconds.get(label(names), ())) for names in (named(content, variant), [])
-    )
+    off = label(named(content, variant))
+    here, whole = (np.array(seconds.get(name, ())) for name in (off, label([])))
     count = len(here)
     if count == 0 or len(whole) != count or not whole.all():
         return Saving(1.0 - float(content["work"][variant]), np.nan, 0)
@@ -175,9 +174,8 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
     panel.set_xlabel("|change of mean $f$| (%)")
     saved = [saving(effects, k, seconds) for k in rows]
     shares, halves = np.array([(100 * one.share, 100 * one.half) for one in saved]).T
-    cost.barh(
-        places, shares, color=style.colour("blue"), height=0.6, xerr=halves, error_kw={"lw": 0.9}
-    )
+    bar: style.Look = {"height": 0.6, "xerr": halves, "error_kw": {"lw": 0.9}}
+    cost.barh(places, shares, color=style.colour("blue"), **bar)
     cost.set_xlim(-50, 100)  # what takes longer than half as much again is no saving
     cost.set_xlabel("run time saved (%)")
     return figure
@@ -185,20 +183,16 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
 
 def caption(effects: Results, timing: Results | None) -> str:
     """What `effects_figure` shows."""
-    seconds = seconds_of(timing)
-    rounds = max(
-        (saving(effects, k, seconds).rounds for k in range(1, effects.sizes["variant"])), default=0
-    )
-    cost = (
-        f"run time saved, mean of {rounds} paired measurements"
-        + (" with its 95 % confidence interval" if rounds > 1 else "")
-        if rounds
-        else "run time saved, estimated from evaluations of the equations of motion"
-    )
+    seconds, cost = seconds_of(timing), "estimated from evaluations of the equations of motion"
+    variants = range(1, effects.sizes["variant"])
+    if rounds := max((saving(effects, k, seconds).rounds for k in variants), default=0):
+        cost = f"mean of {rounds} paired measurements"
+        cost += " with its 95 % confidence interval" if rounds > 1 else ""
     return (
         "Size of the change of the mean of f with each effect off, with its "
         f"{100 * float(effects.attrs['confidence']):g} % confidence interval; dashed: the tolerance. Green: within it in all "
-        f"judged results, red: needed, grey: undecided. “Left out”: the effects that can be neglected together. Right: {cost}."
+        "judged results, red: needed, grey: undecided. “Left out”: the effects that can be neglected together. Right: run "
+        f"time saved, {cost}."
     )
 
 

@@ -40,18 +40,10 @@ def touches(response: Results) -> list[Touch]:
 @style.drawn
 def guide_figure(response: Results) -> "style.Figure":
     """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last two revolutions of a
-    response (kind ``response``).
-
-    Raises
-    ------
-    InputError
-        If no guide has clearance.
-    """
+    response (kind ``response``). Raises InputError where no guide has clearance."""
     if "guide" not in response.sizes:
-        raise InputError(
-            "guide", "", "no guide of this mechanism has clearance",
-            "Give a slide a clearance, length, height and corner_radius",
-        )  # fmt: skip
+        remedy = "Give a slide a clearance, length, height and corner_radius"
+        raise InputError("guide", "", "no guide of this mechanism has clearance", remedy)
     shown = motion.latest(response)
     turn, guides = motion.turns(shown), texts_in(shown, "guide")
     figure, axes = style.grid(3, 1, 110.0, sharex=True)
@@ -71,13 +63,11 @@ def guide_figure(response: Results) -> "style.Figure":
 
 def _corners(panel: "style.Axes", shown: Results, turn: Array) -> None:
     """A row for each corner, filled while it touches, with a tick where a contact begins."""
-    rows = [str(label) for label in shown["joint"].values if "." in str(label)]
+    rows = [label for label in texts_in(shown, "joint") if "." in label]
     for row, label in enumerate(rows):
         depth = shown["penetration"].sel(joint=label).values
-        colour = style.colour(row)
-        panel.fill_between(
-            turn, row - 0.3, row + 0.3, where=depth > 0.0, color=colour, alpha=0.5, lw=0.0
-        )
+        colour, ends = style.colour(row), (row - 0.3, row + 0.3)
+        panel.fill_between(turn, *ends, where=depth > 0.0, color=colour, alpha=0.5, lw=0.0)
         begun = [one.turn for one in touches(shown) if one.contact == label]
         panel.plot(begun, np.full(len(begun), row), "|", color=colour, ms=5.0)
     panel.set_yticks(range(len(rows)), [label.replace("_", " ") for label in rows])

@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 BINS = 60
 DAY = 86400.0
@@ -18,15 +18,15 @@ def _check(identify: Results) -> None:
         raise InputError("identify", 0, reason, "Give hpcclear identify a --signal")
 
 
+def _entry(identify: Results, unknown: int, scale: labels.Scale) -> str:
+    """The label of an axis of an unknown."""
+    return scale.label(labels.entry(texts_in(identify, "unknown")[unknown]))
+
+
 @style.drawn
 def posterior_figure(identify: Results) -> "style.Figure":
-    """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
-
-    Raises
-    ------
-    InputError
-        No signal was measured.
-    """
+    """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``. Raises
+    InputError where no signal was measured."""
     _check(identify)
     count = identify.sizes["unknown"]
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
@@ -42,10 +42,7 @@ def posterior_figure(identify: Results) -> "style.Figure":
             ends = scale(identify["interval"].values[k, u])
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
-        panel.set(
-            xlabel=scale.label(labels.entry(str(identify["unknown"].values[u]))),
-            ylabel=f"density (1/{scale.unit})",
-        )
+        panel.set(xlabel=_entry(identify, u, scale), ylabel=f"density (1/{scale.unit})")
         style.key(panel, "upper right")
     return figure
 
@@ -53,12 +50,7 @@ def posterior_figure(identify: Results) -> "style.Figure":
 @style.drawn
 def features_figure(identify: Results) -> "style.Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
-
-    Raises
-    ------
-    InputError
-        No signal was measured.
-    """
+    Raises InputError where no signal was measured."""
     _check(identify)
     last = identify.isel(record=-1)
     measured, predicted = last["measured"].values, last["predicted"].values
@@ -79,20 +71,14 @@ def features_figure(identify: Results) -> "style.Figure":
 @style.drawn
 def growth_figure(identify: Results) -> "style.Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
-
-    Raises
-    ------
-    InputError
-        There is one record only, or none has a date.
-    """
+    Raises InputError where there is one record only, or none has a date."""
     _check(identify)
     if "rate" not in identify:
-        raise InputError(
-            "identify",
-            1,
+        reason, remedy = (
             "growth needs two records with dates",
             "Give a --signal and a --date for each",
         )
+        raise InputError("identify", 1, reason, remedy)
     count, days = identify.sizes["unknown"], identify["elapsed"].values / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
@@ -110,10 +96,7 @@ def growth_figure(identify: Results) -> "style.Figure":
         if "limit" in identify.attrs:
             limit = scale.factor * float(identify.attrs["limit"])
             panel.axhline(limit, color=style.colour("orange"), ls="--", label="limit")
-        panel.set(
-            xlabel="time since the first record (days)",
-            ylabel=scale.label(labels.entry(str(identify["unknown"].values[u]))),
-        )
+        panel.set(xlabel="time since the first record (days)", ylabel=_entry(identify, u, scale))
         style.key(panel)
     return figure
 

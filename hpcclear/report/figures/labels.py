@@ -17,7 +17,7 @@ from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
 from hpcclear.base.units import factor
 from hpcclear.base.written import Texts, other_unit, reading, text_of
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results, Variable, number_in, text_in
 from hpcclear.results.names import DESIGN_VARIABLES
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.paths import described
@@ -94,9 +94,8 @@ def scale(units: str, values: ArrayLike) -> Scale:
         return Scale(1.0, pretty(units))
     power = int(match[2] or 1)
     exponent = int(np.floor(np.log10(largest) / (3 * power) + 1e-9)) * 3
-    most = (
-        9 if match[1] != "m" else 3 if "/" in units else 0
-    )  # lengths above a metre stay in metres
+    # lengths above a metre stay in metres
+    most = 9 if match[1] != "m" else 3 if "/" in units else 0
     exponent = min(max(exponent, -9), most)
     return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
 
@@ -260,10 +259,8 @@ def design_variables(content: Results) -> list[Variable]:
 
 def clearance(content: Results) -> Variable | None:
     """The design variable that is a clearance, if there is one."""
-    every = design_variables(content)
-    return next(
-        (v for v in every if str(v.attrs.get("long_name")).startswith("radial clearance")), None
-    )
+    named = ((str(v.attrs.get("long_name")), v) for v in design_variables(content))
+    return next((v for words, v in named if words.startswith("radial clearance")), None)
 
 
 def literal(text: str) -> str:
@@ -274,3 +271,14 @@ def literal(text: str) -> str:
 def is_printed(one: Results) -> bool:
     """Whether one design of a dataset of kind ``verification`` is one that a publication prints."""
     return "mean_paper" in one and bool(np.isfinite(one["mean_paper"]))
+
+
+def is_baseline(one: Results) -> bool:
+    """Whether one design of a dataset of kind ``verification`` is the baseline of its case."""
+    return text_in(one, "design").rpartition(" ")[2] == "original"
+
+
+def estimate(one: Results, stem: str) -> tuple[float, float, float]:
+    """A simulated value of a design and the ends of its confidence interval; NaN where they are not known."""
+    value = float(one[stem if stem in one else f"{stem}_true"])
+    return value, number_in(one, f"{stem}_lower"), number_in(one, f"{stem}_upper")

@@ -69,13 +69,8 @@ class Fitting(ConstrainedLayoutEngine):
                 larger = "{:.0f}mm x {:.0f}mm, which they fit".format(*factor * own)
                 break
         figure.set_size_inches(*own / 25.4)
-        reason = f"labels of the figure do not fit this size: {cut}"
-        raise InputError(
-            "--size",
-            "{:.0f}mm x {:.0f}mm".format(*own),
-            reason,
-            f"Give {larger}, or a smaller font",
-        )
+        reason, size = f"labels of the figure do not fit this size: {cut}", "{:.0f}mm x {:.0f}mm"
+        raise InputError("--size", size.format(*own), reason, f"Give {larger}, or a smaller font")
 
     def _cut(self, figure: "Figure") -> str:
         """Words that do not fit the figure or their axis; "" where all do."""
@@ -84,10 +79,7 @@ class Fitting(ConstrainedLayoutEngine):
         for text, room in _labels(figure):
             if text.get_text() and length(text) > 1.2 * room:
                 return repr(" ".join(text.get_text().split()))
-        box, (width, height) = (
-            figure.get_tightbbox().padded(-0.01),
-            figure.get_size_inches(),
-        )  # inches
+        box, (width, height) = figure.get_tightbbox().padded(-0.01), figure.get_size_inches()
         inside = box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height
         return "" if inside and not collapsed else "panels have no room beside them"
 

@@ -131,12 +131,8 @@ class Lettering:
 
     def _written(self, text: str, colour: str) -> tuple[Any, Array]:
         """A word at no place yet, and its size (2,) in points."""
-        back = {
-            "boxstyle": "square,pad=0.05",
-            "fc": style.colour("paper"),
-            "ec": "none",
-            "alpha": 0.85,
-        }
+        back: style.Look = {"boxstyle": "square,pad=0.05", "ec": "none", "alpha": 0.85}
+        back["fc"] = style.colour("paper")
         made = self.axes.text(
             0.0, 0.0, labels.literal(text), color=style.colour(colour), ha="center", va="center", zorder=8,
             linespacing=1.1, bbox=back,
@@ -152,9 +148,8 @@ class Lettering:
     def _cost(self, middles: Array, size: Array) -> Array:
         """Of boxes about middles (n, 2): 1000 and more where one covers another or leaves the sheet, and what is marked."""
         low, high = middles - 0.5 * size, middles + 0.5 * size
-        sides = np.minimum(high[:, None], self._boxes[:, 2:]) - np.maximum(
-            low[:, None], self._boxes[:, :2]
-        )
+        begin, end = np.split(self._boxes, 2, axis=1)
+        sides = np.minimum(high[:, None], end) - np.maximum(low[:, None], begin)
         covered = np.prod(np.maximum(sides, 0.0), axis=2).sum(axis=1)
         room = self.paper(self.corners[1])
         outside = np.maximum(-low, 0.0).sum(axis=1) + np.maximum(high - room, 0.0).sum(axis=1)

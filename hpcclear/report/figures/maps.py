@@ -21,13 +21,8 @@ _EXPONENT = "largest Lyapunov exponent (1/revolution)"
 
 @style.drawn
 def map_figure(samples: Results) -> "style.Figure":
-    """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
-
-    Raises
-    ------
-    InputError
-        The dataset is no map.
-    """
+    """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval. Raises InputError
+    where the dataset is no map."""
     cells = cells_of(samples)
     names = [str(name) for name in cells["objective"].dims]
     return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
@@ -111,12 +106,8 @@ def _line(cells: Results, name: str) -> "style.Figure":
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
     """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``).
 
-    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
-
-    Raises
-    ------
-    InputError
-        The dataset is no bifurcation.
+    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError
+    where the dataset is no bifurcation.
     """
     variables = labels.design_variables(bifurcation)
     if not variables or bifurcation.attrs.get("hpcclear_kind") != "bifurcation":

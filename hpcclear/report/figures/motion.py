@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.results.content import Results, Variable, text_in
+from hpcclear.results.content import Results, Variable, text_in, texts_in
 
 TURN = 2.0 * np.pi
 
@@ -60,25 +60,8 @@ def latest(response: Results, revolutions: int = 2) -> Results:
 
 
 def steady(response: Results, revolutions: int | None = None) -> Results:
-    """The last whole revolutions of a response.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int, optional
-        How many; half of the whole revolutions by default, what stands before counts as the transient.
-
-    Returns
-    -------
-    xarray.Dataset
-        Both ends included.
-
-    Raises
-    ------
-    InputError
-        The response holds fewer revolutions.
-    """
+    """The last whole revolutions of a response, both ends included: half of them by default, what stands before counts as the
+    transient. Raises InputError if the response holds fewer revolutions."""
     angle = turns(response)
     last = _passages(response)[1]
     whole = whole_turns(response)
@@ -92,20 +75,19 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
 
 def joints(response: Results) -> dict[str, str]:
     """Names of the joints of a response, by label."""
-    return {str(label): str(label) for label in response["joint"].values}
+    return {label: label for label in texts_in(response, "joint")}
 
 
 def pins(response: Results) -> list[str]:
     """Labels of the joints of a response that are no corners of sliders in guides."""
-    return [str(label) for label in response["joint"].values if "." not in str(label)]
+    return [label for label in texts_in(response, "joint") if "." not in label]
 
 
 def of_pins(response: Results) -> Results:
     """A response without the corners of sliders in guides; raises InputError where no other joint is left."""
     if not pins(response):
-        raise InputError(
-            "joint", "", "no pin of this mechanism has clearance", "Draw the figure named guide"
-        )
+        reason = "no pin of this mechanism has clearance"
+        raise InputError("joint", "", reason, "Draw the figure named guide")
     return response.sel(joint=pins(response))
 
 
@@ -199,6 +181,5 @@ def section(response: Results, name: str | Variable | Array, phase: float = 0.0)
     at = phase + TURN * np.arange(first, last + 1)
     values = np.asarray(response[name] if isinstance(name, str) else name)
     columns = values.reshape(len(angle), -1).T
-    return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
-        len(at), *values.shape[1:]
-    )
+    found = np.column_stack([np.interp(at, angle, column) for column in columns])
+    return found.reshape(len(at), *values.shape[1:])

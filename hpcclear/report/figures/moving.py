@@ -72,9 +72,8 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     # crank length * crank = rod - u2 * along + e12
     both = np.column_stack([crank.ravel(), along.ravel()])
     pin = float(np.linalg.lstsq(both, (rod + near_pin).ravel(), rcond=None)[0][0]) * crank
-    far = (
-        rod + far_pin
-    )  # from here along the rod to the slider's pin, which stays at one height but for clearance
+    # from here along the rod to the slider's pin, which stays at one height but for clearance
+    far = rod + far_pin
     slides = shown["slider_position"].values
     length = float((slides - far[:, 0]) @ along[:, 0] / (along[:, 0] @ along[:, 0]))
     aside, tilt = (

@@ -15,18 +15,10 @@ FALL = 80.0
 @style.drawn
 def noise_figure(response: Results) -> "style.Figure":
     """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
-    squares of their orders.
-
-    Raises
-    ------
-    InputError
-        If the response has no levels.
-    """
+    squares of their orders. Raises InputError where the response has no levels."""
     if "band" not in response:
-        raise InputError(
-            "noise", "", "this response has no force levels",
-            "Give a joint clearance, and store 64 instants a revolution or more",
-        )  # fmt: skip
+        remedy = "Give a joint clearance, and store 64 instants a revolution or more"
+        raise InputError("noise", "", "this response has no force levels", remedy)
     figure, axes = style.grid(2, 1, 110.0)
     forces = _forces(response)
     highest = max(float(np.nanmax(level)) for level, *_ in forces.values())

@@ -26,12 +26,8 @@ def orbit_figure(response: Results) -> "style.Figure":
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
         look: style.Look = {"color": style.colour("sky"), "lw": 0.7, "label": "free flight"}
         panel.plot(*_flight(x, y, _rolls(angle, contact)), **look)
-        panel.plot(
-            *_along(radius, angle, contact),
-            color=style.colour("vermilion"),
-            lw=0.7,
-            label="contact",
-        )
+        rolled: style.Look = {"color": style.colour("vermilion"), "lw": 0.7, "label": "contact"}
+        panel.plot(*_along(radius, angle, contact), **rolled)
         _circle(panel, clearances[row])
         arc = _along(np.full_like(angle, clearances[row]), angle, contact)
         panel.plot(*arc, color=style.colour("ink"), lw=2.4, label="contact arc")
@@ -95,9 +91,8 @@ def phase_figure(response: Results) -> "style.Figure":
 
 def _bar(figure: "style.Figure", drawn: Any, panels: Any, words: str) -> Any:
     """The colour bar below all panels."""
-    return figure.colorbar(
-        drawn, ax=list(panels), location="bottom", aspect=50, pad=0.02, label=words
-    )
+    look: style.Look = {"location": "bottom", "aspect": 50, "pad": 0.02, "label": words}
+    return figure.colorbar(drawn, ax=list(panels), **look)
 
 
 @style.drawn
@@ -170,10 +165,9 @@ def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array
     turn = np.append(turned, 0.0)[begin] * ahead
     points = 2 + (np.abs(turn) / _STEP).astype(int)
     ends = ~(np.append(rolls, [False, False])[begin + 1] & (ahead > 0))  # with a gap behind it
-    piece = np.repeat(np.arange(len(begin)), points + ends)
-    place = np.arange(len(piece)) - np.repeat(
-        np.cumsum(points + ends) - points - ends, points + ends
-    )
+    whole = points + ends
+    piece = np.repeat(np.arange(len(begin)), whole)
+    place = np.arange(len(piece)) - np.repeat(np.cumsum(whole) - whole, whole)
     k, last = begin[piece], points[piece] - 1
     part = np.where(place < last, place * (ahead[piece] / last), ahead[piece])
     r = radius[k] + part * (radius[k + ahead[piece]] - radius[k])
@@ -186,10 +180,8 @@ def _circle(axes: "style.Axes", radius: float) -> None:
     """The clearance circle; nothing for a joint without clearance."""
     if np.isfinite(radius):
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
-        look: style.Look = {"lw": 0.7, "label": "clearance circle"}
-        axes.plot(
-            radius * np.cos(angle), radius * np.sin(angle), "--", color=style.colour("ink"), **look
-        )
+        look: style.Look = {"lw": 0.7, "label": "clearance circle", "color": style.colour("ink")}
+        axes.plot(radius * np.cos(angle), radius * np.sin(angle), "--", **look)
 
 
 def _cyclic() -> Any:

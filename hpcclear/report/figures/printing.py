@@ -79,12 +79,10 @@ def printing(
         No such size, font or style sheet; or no figure that was drawn has a label of that name.
     """
     rc: dict[str, Any] = {} if sheet is None else _sheet(Path(sheet))
-    if theme != "light":
-        if theme not in colours.THEMES:
-            raise InputError(
-                "--theme", theme, "there is no such theme", nearest(theme, list(colours.THEMES))
-            )
-        rc |= colours.THEMES[theme]
+    if theme not in colours.THEMES:
+        known = list(colours.THEMES)
+        raise InputError("--theme", theme, "there is no such theme", nearest(theme, known))
+    rc |= colours.THEMES[theme] if theme != "light" else {}
     width, height = _size(size) if size else (None, None)
     if width is not None:
         rc["figure.figsize"] = (width * colours.MM, 60.0 * colours.MM)
@@ -118,18 +116,16 @@ def _size(text: str) -> tuple[float, float | None]:
 def _sheet(place: Path) -> dict[str, Any]:
     """The settings of a style sheet; raises InputError where there is none, or it has lines that matplotlib does not know."""
     if not place.is_file():
-        raise InputError(
-            "--style", str(place), "there is no such file", "Give a style sheet of matplotlib"
-        )
+        remedy = "Give a style sheet of matplotlib"
+        raise InputError("--style", str(place), "there is no such file", remedy)
     lines: list[str] = []
     log, listener = logging.getLogger("matplotlib"), logging.Handler(logging.WARNING)
     listener.emit = lambda record: lines.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
     log.addHandler(listener)
     log.propagate = False
+    read = colours.matplotlib().rc_params_from_file
     try:
-        found = dict(
-            colours.matplotlib().rc_params_from_file(str(place), use_default_template=False)
-        )
+        found = dict(read(str(place), use_default_template=False))
     except (OSError, UnicodeError) as error:
         lines.append(str(error))
     finally:
@@ -179,11 +175,11 @@ def renamed(
                 return found[1] + (f" {unit}" if unit and not found[1].endswith(")") else "")
         return before
 
-    for text in _texts(figure, panels) if by_name else ():
+    if not by_name:
+        return
+    for text in _texts(figure, panels):
         text.set_text(changed(text.get_text()))
-    for axis in (
-        [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)] if by_name else ()
-    ):
+    for axis in (axis for panel in panels for axis in (panel.xaxis, panel.yaxis)):
         if type(axis.get_major_locator()).__name__ == "FixedLocator":
             axis.set_ticklabels([changed(one.get_text()) for one in axis.get_ticklabels()])
 

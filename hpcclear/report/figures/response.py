@@ -49,9 +49,7 @@ def penetration_figure(response: Results) -> "style.Figure":
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
         panel.set_title(f"{joints[joint]}\n{motion.contact(shown, joint)}")
         panel.set_ylabel(unit.label("penetration"))
-    axes[0, 0].set_ylim(
-        bottom=0.0
-    )  # after all, as a limit ends the automatic scale that they share
+    axes[0, 0].set_ylim(bottom=0.0)  # at last, as a limit ends the automatic scale that they share
     axes[-1, 0].set_xlabel(motion.turns_label(shown))
     return figure
 

@@ -14,13 +14,7 @@ from hpcclear.results.content import Results, Variable
 @style.drawn
 def samples_figure(samples: Results) -> "style.Figure":
     """Objective of samples (kind ``samples``) against every design variable, coloured by clearance; its spread, histogram and
-    failures.
-
-    Raises
-    ------
-    InputError
-        There is no design variable to draw against.
-    """
+    failures. Raises InputError where there is no design variable to draw against."""
     variables = labels.design_variables(samples)
     if not variables:
         reason = "there is no design variable to draw the objective against"

@@ -82,13 +82,7 @@ _PICTURE = 95.0  # mm of width of a drawing alone
 @style.drawn
 def mechanism_figure(response: Results, before: Results | None = None) -> "style.Figure":
     """The mechanism of a response (kind ``response``) to scale, with dimensions; beside that of another design, parts that
-    differ are coloured and its outline is dashed.
-
-    Raises
-    ------
-    InputError
-        The file does not hold its scene whole.
-    """
+    differ are coloured and its outline is dashed. Raises InputError where the file does not hold its scene whole."""
     scene, poses = _posed(response)
     other = None if before is None else _posed(before)
     changed = None if other is None else changes(scene, other[0])

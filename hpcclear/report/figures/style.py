@@ -262,10 +262,8 @@ def legend(
     entries: dict[str, Any] = {}
     if _columns.get() is not None:  # of the column before
         for old in figure.legends:
-            entries |= {
-                one.get_text(): drawn
-                for one, drawn in zip(old.get_texts(), old.legend_handles, strict=True)
-            }
+            words = (one.get_text() for one in old.get_texts())
+            entries |= dict(zip(words, old.legend_handles, strict=True))
             old.remove()
     for panel in np.ravel(np.asarray(panels, dtype=object)):
         entries |= {word: one for one, word in zip(*panel.get_legend_handles_labels(), strict=True)}
@@ -276,9 +274,8 @@ def legend(
 
 def key(panel: "Axes", place: str = "best", **options: Any) -> None:
     """The legend of one panel, of as many columns as fit its width; ``"above"`` is over its data, on the right."""
-    make = functools.partial(
-        panel.legend, loc={"above": "upper right"}.get(place, place), **options
-    )
+    where = "upper right" if place == "above" else place
+    make = functools.partial(panel.legend, loc=where, **options)
     made = _in_columns(make, len(panel.get_legend_handles_labels()[1]), panel.bbox.width)
     if made is not None and place == "above":
         share = min(1.2 * made.get_window_extent().height / panel.bbox.height, 0.7)

@@ -47,10 +47,8 @@ def _sensitivity_panel(
         slope, error = unit(one["sensitivity"]), 2.0 * unit(one["standard_error"])
         if not np.isfinite(slope).any():
             continue  # no input of this surface
-        look = style.look(row)
-        axes.fill_between(
-            clearance, slope - error, slope + error, color=look["color"], alpha=0.18, lw=0.0
-        )
+        look, band = style.look(row), (slope - error, slope + error)
+        axes.fill_between(clearance, *band, color=look["color"], alpha=0.18, lw=0.0)
         axes.plot(clearance, slope, label=symbol(str(parameter)), **{**look, "marker": ""})
         if "best_sensitivity" in surface:
             best = surface.sel(parameter=parameter)
@@ -72,9 +70,8 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
     across = labels.of(sensitivity["clearance"])
     clearance = across(sensitivity["clearance"])
     intervals = sensitivity["interval"].values
-    colours = style.matplotlib().colormaps[style.matplotlib().rcParams["image.cmap"]](
-        np.linspace(0.0, 0.9, len(intervals))
-    )
+    shades = style.matplotlib().colormaps[style.matplotlib().rcParams["image.cmap"]]
+    colours = shades(np.linspace(0.0, 0.9, len(intervals)))
     for line, surface in zip(axes, surfaces, strict=True):
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
@@ -99,13 +96,8 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
 
 @style.drawn
 def sobol_figure(sensitivity: Results) -> "style.Figure":
-    """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors.
-
-    Raises
-    ------
-    InputError
-        The file has no Sobol indices.
-    """
+    """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors. Raises
+    InputError where the file has no Sobol indices."""
     if "sobol_total" not in sensitivity:
         reason = "the study did not compute Sobol indices"
         remedy = "Set it to a power of two and run again"
@@ -136,12 +128,8 @@ LEVELS = 24
 def surfaces_figure(kriging: Results) -> "style.Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
-    Of a file of kind ``kriging`` the models of two variables and the clearance are drawn.
-
-    Raises
-    ------
-    InputError
-        No model has three inputs, the clearance among them.
+    Of a file of kind ``kriging`` the models of two variables and the clearance are drawn. Raises InputError where no model has
+    three inputs, the clearance among them.
     """
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
@@ -187,11 +175,8 @@ def _fields(model: "Piecewise", main: int) -> tuple[Array, Array, Array, Array]:
     x, y = (np.linspace(lower[i], upper[i], 41) for i in range(3) if i != main)
     clearances = np.array([lower[main], upper[main]])
     mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    values = [
-        model.predict(np.insert(mesh, main, clearance, axis=1)).reshape(len(x), len(y))
-        for clearance in clearances
-    ]
-    return x, y, np.array(values), clearances
+    values = np.array([model.predict(np.insert(mesh, main, one, axis=1)) for one in clearances])
+    return x, y, values.reshape(-1, len(x), len(y)), clearances
 
 
 @style.drawn

@@ -38,13 +38,8 @@ def fan_figure(wear: Results) -> "style.Figure":
 
 @style.drawn
 def survival_figure(wear: Results) -> "style.Figure":
-    """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``).
-
-    Raises
-    ------
-    InputError
-        No limit was given that could end a life.
-    """
+    """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``). Raises InputError
+    where no limit was given that could end a life."""
     if not any(name.startswith("limit_") for name in wear.attrs):
         reason, remedy = "no limit ends a service life", "Give one, such as clearance"
         raise InputError("wear.limit", None, reason, remedy)
@@ -74,17 +69,11 @@ AGES = 4
 
 @style.drawn
 def profile_figure(wear: Results) -> "style.Figure":
-    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``).
-
-    Raises
-    ------
-    InputError
-        Surfaces wear evenly.
-    """
+    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``). Raises
+    InputError where surfaces wear evenly."""
     if "bearing_profile" not in wear:
-        raise InputError(
-            "wear.profile", "uniform", "wear is uniform around the surfaces: there is no profile", 'Set it to "angular"'
-        )  # fmt: skip
+        reason = "wear is uniform around the surfaces: there is no profile"
+        raise InputError("wear.profile", "uniform", reason, 'Set it to "angular"')
     panels = [
         (str(name), surface, depths)
         for name in wear["joint"].values
@@ -100,12 +89,8 @@ def profile_figure(wear: Results) -> "style.Figure":
     for panel, (name, surface, depths) in zip(axes.ravel(), panels, strict=False):
         scale = labels.scale("m", depths.values)
         for shade, age in zip(np.linspace(0.3, 1.0, len(ages)), ages, strict=True):
-            value = scale(depths.isel(cycle=age))
-            look = {
-                "color": style.colour("blue"),
-                "alpha": shade,
-                "label": f"{float(wear['cycle'][age]):.3g}",
-            }
+            value, label = scale(depths.isel(cycle=age)), f"{float(wear['cycle'][age]):.3g}"
+            look = {"color": style.colour("blue"), "alpha": shade, "label": label}
             panel.plot(angle, np.append(value, value[0]), **look)
         panel.set_title(f"{name}\n{scale.label(surface)}")
         panel.set_rmin(0.0)

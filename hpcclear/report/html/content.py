@@ -93,12 +93,10 @@ def read(*places: str | Path) -> Content:
             (others if kind == "samples" else troubles).append(text)
         else:
             files[kind], names[kind] = one, path.name
-    stems = [Path(name).name for name in several]
-    samples = {
-        name if stems.count(Path(name).name) > 1 else Path(name).name: own
-        for name, own in several.items()
-        if "samples" in own
-    }
+    stems = {name: Path(name).name for name in several}
+    twice = [stem for stem in stems.values() if [*stems.values()].count(stem) > 1]
+    named = {name if stem in twice else stem: several[name] for name, stem in stems.items()}
+    samples = {name: own for name, own in named.items() if "samples" in own}
     if len(samples) < 2 or not files.keys() <= {"samples", "timing"}:
         samples, troubles = {}, [*troubles, *others]  # a study's own samples, or the only ones
     if not files and not responses:

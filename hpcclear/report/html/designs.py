@@ -91,11 +91,10 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
 
 def _cell(one: Results, name: str, scale: labels.Scale) -> str:
     """A value, if it was simulated with the half-width of its confidence interval."""
-    value, word = float(one[name]) * scale.factor, name.removesuffix("_true")
-    if f"{word}_lower" not in one or f"{word}_upper" not in one:
-        return number(value)
-    half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
-    return labels.paired(value, half) if np.isfinite([value, half]).all() else number(value)
+    value, low, high = np.array(labels.estimate(one, name.removesuffix("_true"))) * scale.factor
+    return (
+        labels.paired(value, (high - low) / 2) if np.isfinite([value, low]).all() else number(value)
+    )
 
 
 PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs, "verification"),)

@@ -59,9 +59,8 @@ def figures(
     """Figures, those named `first` before the others, at most so many, for the width of the page where named `wide`: name,
     subject, picture (PNG, base64) and caption; in `troubles`, why one was left out."""
     made: list[dict[str, str]] = []
-    for name, kind, caption, draw in sorted(
-        _drawings(content), key=lambda one: one[0] not in first
-    ):
+    every = sorted(_drawings(content), key=lambda one: one[0] not in first)
+    for name, kind, caption, draw in every:
         if len(made) == most:
             break
         here = contextvars.copy_context()
@@ -76,11 +75,9 @@ def figures(
 
 def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
     """Every figure that there may be: name, kind of its file, caption, and what draws it."""
-    every = content.each_of_samples() if len(content.samples) <= MOST_DRAWN else iter(())
-    for before, one in [
-        *((f"{name}: ", own) for name, own in every),
-        *([] if content.samples else [("", content)]),
-    ]:
+    several = content.each_of_samples() if len(content.samples) <= MOST_DRAWN else iter(())
+    every = [(f"{name}: ", own) for name, own in several] if content.samples else [("", content)]
+    for before, one in every:
         for figure in declared(FigureOf):
             if figure.kind in one.files:
                 caption = before + figure.captioned(one.files)

@@ -32,16 +32,12 @@ def loads(content: Content) -> list[object] | None:
         header = ["response", "largest torque", "mean torque", "objective f"]
         rows = [_whole(name, one) for name, one in valid.items()]
         parts.append(_table(header, rows, "Drive and objective"))
-    impacts = [
-        [name, joint, *map(Number, cells)]
-        for name, one in valid.items()
-        for joint, *cells in noise.joints(one)
-    ]
+    impacts, further = list[list[object]](), list[list[object]]()
+    for name, one in valid.items():
+        impacts += [[name, joint, *map(Number, cells)] for joint, *cells in noise.joints(one)]
+        further += [[name, *row] for row in _further(one, len(valid) == 1)]
     if impacts:
         parts.append(_table(["response", *noise.HEADER], impacts, noise.TITLE))
-    further = [
-        [name, *row] for name, one in valid.items() for row in _further(one, len(valid) == 1)
-    ]
     if further:
         parts.append(_table(["response", "quantity", "value"], further, "Further results"))
     for name, one in every.items():
@@ -68,17 +64,22 @@ def _remarks(shown: Mapping[str, Results]) -> list[str]:
 
 def _bearings(found: dict[str, list[bearings.Bearing]]) -> PageTable:
     """The bearings of all responses; a column of pressures where the length of a bearing is known."""
-    header: list[object] = [
-        "response", "joint", "peak force", "at crank angle", "mean force", "contact", "mean gap",
-    ]  # fmt: skip
-    pressed = bearings.pressures([one for each in found.values() for one in each])
+    every = [(name, one) for name, each in found.items() for one in each]
+    pressed = bearings.pressures([one for _, one in every])
+    header = (
+        "response",
+        "joint",
+        "peak force",
+        "at crank angle",
+        "mean force",
+        "contact",
+        "mean gap",
+    )
     rows = [
-        [*_row(name, one), *(Number(shown(one)) for _, shown in pressed)]
-        for name, each in found.items()
-        for one in each
+        [*_row(name, one), *(Number(shown(one)) for _, shown in pressed)] for name, one in every
     ]
-    header += [title for title, _ in pressed]
-    return _table(header, rows, "Bearings, over the averaged revolutions")
+    titles = [*header, *(title for title, _ in pressed)]
+    return _table(titles, rows, "Bearings, over the averaged revolutions")
 
 
 def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: str) -> PageTable:
@@ -97,12 +98,8 @@ def _row(name: str, one: bearings.Bearing) -> list[object]:
 def _whole(name: str, found: Results) -> list[object]:
     drive = bearings.torque(found)
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
-    return [
-        name,
-        quantity(drive.peak, "N m"),
-        quantity(drive.mean, "N m"),
-        Number(labels.with_half_width(f, half_width(found), unit)),
-    ]
+    known = Number(labels.with_half_width(f, half_width(found), unit))
+    return [name, quantity(drive.peak, "N m"), quantity(drive.mean, "N m"), known]
 
 
 def _further(response: Results, alone: bool) -> list[tuple[str, str]]:

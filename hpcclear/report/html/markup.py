@@ -58,26 +58,20 @@ def _templates() -> "jinja2.Environment":
     import jinja2  # once a page is written
 
     made = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_source),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        loader=jinja2.FunctionLoader(lambda name: asset(f"templates/{name}")), autoescape=True,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         finalize=_without_controls,
-    )
+    )  # fmt: skip
     made.tests["number_text"] = lambda value: isinstance(value, Number)
     # the page's script relies on the order of entries, and NaN is no JSON
-    made.policies["json.dumps_kwargs"] = {
-        "ensure_ascii": True,
-        "allow_nan": False,
-        "separators": (",", ":"),
-    }
+    kept = {"ensure_ascii": True, "allow_nan": False, "separators": (",", ":")}
+    made.policies["json.dumps_kwargs"] = kept
     return made
 
 
-def _source(name: str) -> str:
-    folder = resources.files(__package__).joinpath("templates")
-    return folder.joinpath(name).read_text(encoding="utf-8")
+def asset(name: str) -> str:
+    """The text of a file that belongs to the page."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 _CONTROLS = {code: None for code in (*range(32), 127) if chr(code) not in "\n\t"}

@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
-from hpcclear.report.html.markup import PageTable, render
+from hpcclear.report.html.markup import PageTable, asset, render
 from hpcclear.report.parts import SectionOf, declared
 from hpcclear.report.screen import WORRIES, Screen
 from hpcclear.report.screens import screen_of
@@ -100,8 +99,8 @@ def _page(content: Content) -> str:
         title=first.title or f"Report on {_readable(content.directory.resolve().name)}",
         sheet=sheet_of(content, first),
         policy=_policy(),
-        style=_asset("page.css"),
-        script=_asset("page.js"),
+        style=asset("page.css"),
+        script=asset("page.js"),
         picture=shown or {"front": {"points": []}, "responses": {}, "motions": {}},
         source=content.attribute("source") or "hpcclear",
         screen=first.shown(),
@@ -129,13 +128,9 @@ def _picture(content: Content) -> dict[str, Any]:
     return made
 
 
-def _asset(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
 def _policy() -> str:
     """Only this page's own script runs, and nothing is loaded: text from a scene cannot do anything."""
-    digest = base64.b64encode(hashlib.sha256(_asset("page.js").encode()).digest()).decode()
+    digest = base64.b64encode(hashlib.sha256(asset("page.js").encode()).digest()).decode()
     rules = (
         "default-src 'none'",
         "img-src data:",

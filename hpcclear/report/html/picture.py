@@ -16,6 +16,7 @@ _LEGEND = {"design": "simulated", "original": "baseline design", "printed": "des
 _USUAL = ("mean of f", "standard deviation of f")
 _WORDS = {"mean": "mean", "deviation": "standard deviation"}
 FRAMES = 180  # of a revolution
+POINTS = 720  # of a curve, about
 
 
 def picture(content: Content) -> dict[str, Any]:
@@ -64,78 +65,50 @@ def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
     goals = [point.pop("goals") for point in points]
     units = {words: one[0] for own in goals for words, one in own.items()}
     names = list(dict.fromkeys([*(words for words in leading if words in units), *units]))
-    scales = [
-        labels.scale(units[words], [own[words][1] for own in goals if words in own])
-        for words in names
-    ]
+    known = {words: [own[words][1] for own in goals if words in own] for words in names}
+    scales = {words: labels.scale(units[words], values) for words, values in known.items()}
     for point, own in zip(points, goals, strict=True):
-        found = [
-            own[w][1] * s.factor if w in own else np.nan for w, s in zip(names, scales, strict=True)
-        ]
-        at = [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
+        at: list[float | None] = []
+        ends: list[list[float] | None] = []
+        for words, scale in scales.items():
+            _, *numbers = own.get(words, ("", np.nan, np.nan, np.nan))
+            value, *both = (float(f"{one * scale.factor:.6g}") for one in numbers)
+            at.append(value if np.isfinite(value) else None)
+            ends.append(both if np.isfinite(both).all() else None)
         point["x"], point["y"] = at[:2]
-        ends = [
-            [float(f"{end * s.factor:.6g}") for end in own[w][2:]]
-            if len(own.get(w, ())) == 4
-            else None
-            for w, s in zip(names, scales, strict=True)
-        ]
         if any(ends):
             point["intervals"] = ends
         if len(names) > 2:
             point["at"] = at
-    return [s.label(w) if s.unit != "–" else w for w, s in zip(names, scales, strict=True)]
+    return [s.label(words) if s.unit != "–" else words for words, s in scales.items()]
 
 
-Goal = tuple[str, float] | tuple[str, float, float, float]
-"""Unit and value of an objective, and the ends of its confidence interval where that is known."""
+Goal = tuple[str, float, float, float]
+"""Unit and value of an objective, and the ends of its confidence interval, NaN where that is not known."""
 
 
 def _usual(one: Results) -> dict[str, Goal]:
     """Mean and standard deviation of f, which every design has, by their words."""
-    return {
-        words: (
-            str(one[f"{name}_true"].attrs["units"]),
-            float(one[f"{name}_true"]),
-            *_ends(one, name),
-        )
-        for words, name in zip(_USUAL, ("mean", "deviation"), strict=True)
-    }
-
-
-def _ends(one: Results, name: str) -> tuple[()] | tuple[float, float]:
-    """Ends of the confidence interval of a simulated value; nothing where they are not known."""
-    if f"{name}_lower" not in one:
-        return ()
-    ends = float(one[f"{name}_lower"]), float(one[f"{name}_upper"])
-    return ends if np.isfinite(np.array(ends)).all() else ()
+    named = zip(_USUAL, ("mean", "deviation"), strict=True)
+    every = ((words, name, str(one[f"{name}_true"].attrs["units"])) for words, name in named)
+    return {words: (unit, *labels.estimate(one, name)) for words, name, unit in every}
 
 
 def _verified(one: Results) -> dict[str, Goal]:
     """What the case of a design makes small, by simulation: unit and value by its words."""
-    return {
-        text_in(one, f"{name}_goal"): (
-            text_in(one, f"{name}_unit") or "1",
-            float(one[f"{name}_true"]),
-            *_ends(one, name),
-        )
-        for name in goals_of(one)
-    }
+    goals = {name: text_in(one, f"{name}_unit") or "1" for name in goals_of(one)}
+    return {text_in(one, f"{n}_goal"): (u, *labels.estimate(one, n)) for n, u in goals.items()}
 
 
 def _design(one: Results) -> dict[str, Any]:
     """A design that was simulated directly."""
-    name = text_in(one, "design")
-    is_original = name.rpartition(" ")[2] == "original"
-    surrogate = (
-        _moments(one, "mean_surrogate", "deviation_surrogate") if "mean_surrogate" in one else []
-    )
+    name, is_original = text_in(one, "design"), labels.is_baseline(one)
     return {
         "kind": "printed" if labels.is_printed(one) else "original" if is_original else "design",
         "name": name,
         "case": text_in(one, "case"),
         "design": _values(one),
-        "surrogate": surrogate,
+        "surrogate": _predicted(one),
         "direct": simulated(one),
         "response": "original" if is_original else name,
         "goals": _usual(one) | _verified(one),
@@ -148,31 +121,28 @@ def _values(one: Results) -> list[list[str]]:
     return [[name, str(value)] for name, value in rows if value != "–"]
 
 
-def _moments(one: Results, mean: str, deviation: str) -> list[list[str]]:
+def _predicted(one: Results) -> list[list[str]]:
+    """Mean and standard deviation by the surrogate; none where they are not known."""
+    rows = {words: f"{name}_surrogate" for name, words in _WORDS.items()}
     return [
-        [_WORDS[word], str(quantity(float(one[name]), str(one[name].attrs["units"])))]
-        for word, name in (("mean", mean), ("deviation", deviation))
+        [words, str(quantity(float(one[name]), str(one[name].attrs["units"])))]
+        for words, name in rows.items()
+        if name in one
     ]
 
 
-def series(response: Results, most: int = 720) -> list[dict[str, Any]]:
+def series(response: Results) -> list[dict[str, Any]]:
     """Curves of the last two revolutions: turns of the drive from 0, values in readable units."""
     shown = motion.latest(response, 2)
-    every = max(1, shown.sizes["time"] // most)
+    every = max(1, shown.sizes["time"] // POINTS)
     shown = shown.isel(time=slice(None, None, every))
     turn = motion.turns(shown) - motion.turns(shown)[0]
     found = []
     for name, joint, word in motion.quantities(shown):
         one = shown[name].sel(joint=joint) if joint else shown[name]
         values = np.nan_to_num(one.values)
-        found.append(
-            {
-                "label": word,
-                "unit": str(one.attrs["units"]),
-                "x": _digits(turn),
-                "y": _digits(values),
-            }
-        )
+        curve = {"x": _digits(turn), "y": _digits(values)}
+        found.append({"label": word, "unit": str(one.attrs["units"]), **curve})
     return found
 
 

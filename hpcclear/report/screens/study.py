@@ -31,7 +31,7 @@ from hpcclear.report.screen import (
     upper,
     within,
 )
-from hpcclear.results.content import Results, number_in, text_in, texts_in
+from hpcclear.results.content import Results, text_in, texts_in
 from hpcclear.scene.domain import bound_at, shares
 
 MOST = 0.5
@@ -108,12 +108,6 @@ def _about(of: Recommended) -> Iterator[str]:
         yield f"{count} simulations of {designs} designs and a surrogate"
 
 
-def _ends(one: Results, stem: str) -> tuple[float, float, float]:
-    """A simulated value and the ends of its interval, NaN where they are not known."""
-    value = float(one[stem if stem in one else f"{stem}_true"])
-    return value, number_in(one, f"{stem}_lower"), number_in(one, f"{stem}_upper")
-
-
 def _statistics(best: Results) -> dict[str, str]:
     """Words of the values that are shown, and their stems: what the case makes small, then what every design has."""
     asked = [] if is_plain(best) else goals_of(best)
@@ -133,8 +127,8 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
     for words in sorted(known, key=lambda one: one not in limits):
         stem = known[words]
         name = stem if stem in best else f"{stem}_true"
-        unit, mine = answer.unit_of(best, name), _ends(best, stem)
-        before = None if base is None else _ends(base, stem)
+        unit, mine = answer.unit_of(best, name), labels.estimate(best, stem)
+        before = None if base is None else labels.estimate(base, stem)
         moved, good = ("", None) if before is None else change(mine, before)
         shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
@@ -249,7 +243,7 @@ def _accuracy(best: Results) -> Trust:
         return Trust.green("Requested accuracy reached", "quality")
     known = []
     for stem in ("mean", "deviation"):
-        value, low, high = _ends(best, stem)
+        value, low, high = labels.estimate(best, stem)
         if value and np.isfinite([low, high]).all():
             known.append(f"{_USUAL[stem]} {percent((high - low) / 2.0 / abs(value))}")
     if not known:
