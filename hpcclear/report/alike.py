@@ -39,11 +39,8 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
 
 def masses(verified: Results) -> list[Variable]:
     """Return the design variables that are masses."""
-    return [
-        one
-        for one in labels.design_variables(verified)
-        if one.attrs.get("units") == "kg" and "of_random_inputs" not in one.attrs
-    ]
+    every = (v for v in labels.design_variables(verified) if "of_random_inputs" not in v.attrs)
+    return [one for one in every if one.attrs.get("units") == "kg"]
 
 
 def _lightest(together: Results, best: Results) -> str:
@@ -62,11 +59,8 @@ def others(ours: Results, best: Results) -> list[str]:
     """Return other designs that are statistically indistinguishable from the best; all satisfy the constraints, or none is."""
     if not satisfies(best):
         return []
-    same = [
-        *again(ours, best),
-        *(text_in(one, "design") for one in each(ours, "design") if not satisfies(one)),
-    ]
-    return [name for name in _twins(ours, best) if name not in same]
+    bad = [text_in(one, "design") for one in each(ours, "design") if not satisfies(one)]
+    return [name for name in _twins(ours, best) if name not in (*again(ours, best), *bad)]
 
 
 def satisfies(one: Results) -> bool:

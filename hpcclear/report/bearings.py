@@ -64,19 +64,10 @@ def bearings(response: Results) -> list[Bearing]:
         if gap == peak == 0.0:
             continue  # an ideal joint of a slider-crank
         mean, touching = _means(response, k, inside)
-        found.append(
-            Bearing(
-                joint,
-                peak,
-                _known(response, "peak_angle", k),
-                mean,
-                mean / areas.get(joint, np.nan),
-                _known(response, "peak_contact_pressure", k),
-                _known(response, "contact_half_angle", k),
-                touching,
-                gap,
-            )
-        )
+        names = ("peak_angle", "peak_contact_pressure", "contact_half_angle")
+        angle, largest, half = (_known(response, name, k) for name in names)
+        pressure = mean / areas.get(joint, np.nan)
+        found.append(Bearing(joint, peak, angle, mean, pressure, largest, half, touching, gap))
     return found
 
 
@@ -101,10 +92,8 @@ def torque(response: Results) -> Torque:
         return Torque(np.nan, np.nan)
     peak = float(np.abs(response["crank_moment"].values[inside]).max())
     # impacts fall between the stored instants of the torque; the work has each of them
-    work, angle = (
-        float(one[-1] - one[0])
-        for one in (response[name].values[inside] for name in ("driving_work", "crank_angle"))
-    )
+    both = (response[name].values[inside] for name in ("driving_work", "crank_angle"))
+    work, angle = (float(one[-1] - one[0]) for one in both)
     swings = abs(angle) < 0.5 * np.ptp(motion.phase(response)[inside])
     if swings or angle == 0.0 or not _one_drive(response):
         return Torque(peak, np.nan)
@@ -179,11 +168,8 @@ def pressures(found: Sequence[Bearing]) -> list[tuple[str, Callable[[Bearing], s
         ("half angle of contact", "half_angle", lambda one: _in_degrees(one.half_angle)),
         ("peak pressure", "peak_pressure", lambda one: labels.quantity(one.peak_pressure, "Pa", 3)),
     ]  # fmt: skip
-    return [
-        (title, shown)
-        for title, entry, shown in columns
-        if any(np.isfinite(getattr(one, entry)) for one in found)
-    ]
+    known = {entry for _, entry, _ in columns if any(np.isfinite(getattr(b, entry)) for b in found)}
+    return [(title, shown) for title, entry, shown in columns if entry in known]
 
 
 def _in_degrees(angle: float) -> str:
@@ -198,9 +184,8 @@ def degrees(one: Bearing) -> str:
 def sensitive_words(relative: float, content: Results) -> str:
     """Return the warning of a half-width of f that is so large, relative to f, of a response or samples."""
     remedy = "Set numerics.target_error for a mean with a confidence interval"
-    if (
-        "objective" in content.attrs
-    ):  # as files have of other objectives only; these have no steady means
+    # as files have of other objectives only; these have no steady means
+    if "objective" in content.attrs:
         remedy = "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
     return (
         "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is "
@@ -240,8 +225,8 @@ def _projected_areas(response: Results) -> dict[str, float]:
     if (scene := scene_of(response)) is None:
         return {}
     pins = {joint: scene.pin(joint) for joint in scene.pins()}
-    lengths = {joint: path for joint, one in pins.items() if (path := one.length_path) is not None}
     return {
-        joint: 2.0 * pins[joint].bearing_radius * float(attrgetter(path)(pins[joint]))
-        for joint, path in lengths.items()
+        joint: 2.0 * one.bearing_radius * float(attrgetter(one.length_path)(one))
+        for joint, one in pins.items()
+        if one.length_path is not None
     }

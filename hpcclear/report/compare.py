@@ -152,31 +152,14 @@ def compare(
     revolution = int(np.mod(at[0], span) / span * turns + 1e-9) % turns + 1
     others = span / turns * (np.arange(turns) + 1 - revolution)
     every = _every(place, at)
-    quantities = tuple(
-        ComparedSignal(
-            one.name,
-            one.label,
-            one.unit,
-            column.unit,
-            own,
-            curve(at),
-            curve(every),
-            np.array([np.sqrt(np.mean((curve(at + one) - own) ** 2)) for one in others]),
-        )
-        for (column, one), own, curve in zip(pairs, measured, simulated, strict=True)
-    )
+    quantities = []
+    for (column, one), own, curve in zip(pairs, measured, simulated, strict=True):
+        errors = np.array([np.sqrt(np.mean((curve(at + step) - own) ** 2)) for step in others])
+        series = own, curve(at), curve(every), errors
+        quantities.append(ComparedSignal(one.name, one.label, one.unit, column.unit, *series))
     series_x = _measured_axis(shown, axis, given, at, every)
-    return Comparison(
-        axis,
-        "s" if sheet.is_clock(along) else along.unit,
-        given,
-        shift,
-        words,
-        turns,
-        revolution,
-        series_x,
-        quantities,
-    )
+    unit, found = "s" if sheet.is_clock(along) else along.unit, (shift, words, turns, revolution)
+    return Comparison(axis, unit, given, *found, series_x, tuple(quantities))
 
 
 def _aligned(
@@ -230,10 +213,11 @@ def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
     """Kind and column of what a table runs along: the first, where it has time and angle."""
     for axis in sheet.axes.items():
         return axis
-    raise InputError(
-        "heading", sheet.columns[0].heading, "the first column is neither time nor angle",
+    reason, remedy = (
+        "the first column is neither time nor angle",
         'Call it "time [s]" or "crank_angle [deg]"',
-    )  # fmt: skip
+    )
+    raise InputError("heading", sheet.columns[0].heading, reason, remedy)
 
 
 def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:
@@ -254,13 +238,11 @@ def _signal(response: Results, column: SheetColumn, names: Mapping[str, str]) ->
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
         fitting = [name for name in found if column.unit and fits(column.unit, found[name].unit)]
-        remedy = (
-            f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, fitting or list(found))
-        )
+        known = nearest(wanted, fitting or list(found))
+        remedy = f"Use one of: {', '.join(alike)}" if alike else known
         remedy += ". --name COLUMN=QUANTITY names the quantity of a column"
-        raise InputError(
-            "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
-        )
+        reason = f"the response has no quantity {wanted!r}"
+        raise InputError("heading", column.heading, reason, remedy)
     return found[match]
 
 
@@ -291,10 +273,8 @@ def _best(
     few = np.unique(np.linspace(0, len(at) - 1, min(len(at), MOST_POINTS)).astype(int))
 
     def agreement(shift: float) -> float:
-        return sum(
-            _correlation(curve(at[few] + shift), own[few])
-            for curve, own in zip(simulated, measured, strict=True)
-        )
+        pairs = zip(simulated, measured, strict=True)
+        return sum(_correlation(curve(at[few] + shift), own[few]) for curve, own in pairs)
 
     best = float(max(shifts, key=agreement)) if len(shifts) > 1 else float(shifts[0])
     if refine and len(shifts) > 1:

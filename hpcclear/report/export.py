@@ -6,7 +6,7 @@ import json
 import math
 import re
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,8 +60,7 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
     place = Path(output)
     check_format(place)
     table = to_table(dataset.read(path), units)
-    content, mark = FORMATS[place.suffix.lower()](table)
-    files.write_bytes(place, content, mark)
+    files.write_bytes(place, *FORMATS[place.suffix.lower()](table))
     return table
 
 
@@ -122,8 +121,7 @@ def statistics(
         "units": {}, "long_names": {}, "title": "Statistics of samples", "about": about,
         "scene": "\n".join(scenes), "scene_hash": "",
     }  # fmt: skip
-    content, mark = FORMATS[Path(output).suffix.lower()](table)
-    files.write_bytes(Path(output), content, mark)
+    files.write_bytes(Path(output), *FORMATS[Path(output).suffix.lower()](table))
     return table
 
 
@@ -202,9 +200,7 @@ def _mat(table: "DataFrame") -> Written:
         while name in names.values():
             name, k = f"{identifier(str(heading))[:59]}_{k}", k + 1
         names[str(heading)] = name
-    content: dict[str, object] = {
-        names[str(h)]: _column(table[h].to_numpy()) for h in table.columns
-    }
+    content: dict[str, object] = {names[str(h)]: _column(table[h].values) for h in table.columns}
     content |= {names[h]: table.attrs[h] for h in names if h in table.attrs}
     for key in ("units", "long_names"):
         content[key] = {names[h]: text for h, text in table.attrs[key].items() if h in names}
@@ -262,14 +258,13 @@ def _book(sheets: Mapping[str, Iterable[Sequence[object]]]) -> bytes:
         for name, rows in sheets.items():
             sheet = book.add_worksheet(name)
             sheet.freeze_panes(1, 0)
-            for at, row in enumerate(rows):
-                for column, value in enumerate(row):
-                    if not isinstance(value, int | float):
-                        sheet.write_string(at, column, _CONTROL.sub(" ", str(value))[:LONGEST_CELL])
-                    elif math.isfinite(value):
-                        sheet.write_number(
-                            at, column, _Exact(value) if isinstance(value, float) else value
-                        )
+            cells = ((at, k, one) for at, row in enumerate(rows) for k, one in enumerate(row))
+            for at, column, value in cells:
+                if not isinstance(value, int | float):
+                    sheet.write_string(at, column, _CONTROL.sub(" ", str(value))[:LONGEST_CELL])
+                elif math.isfinite(value):
+                    exact = _Exact(value) if isinstance(value, float) else value
+                    sheet.write_number(at, column, exact)
     with zipfile.ZipFile(buffer, "a") as archive:
         archive.comment = BOOK_MARK
     return buffer.getvalue()
@@ -287,10 +282,5 @@ def _arrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-FORMATS: dict[str, Callable[["DataFrame"], Written]] = {
-    ".csv": _csv,
-    ".xlsx": _xlsx,
-    ".mat": _mat,
-    ".parquet": _parquet,
-}
+FORMATS = {".csv": _csv, ".xlsx": _xlsx, ".mat": _mat, ".parquet": _parquet}
 """What makes a file of each ending."""

@@ -64,11 +64,10 @@ def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
     """
     if failed.all():
         return ""
-    named = sorted(
-        ((_distance(one.values, failed), one) for one in columns), key=lambda row: -row[0]
-    )
-    least = max(CLEAR, SURE * np.sqrt(1.0 / failed.sum() + 1.0 / (~failed).sum()))
-    shown = [one for distance, one in named if distance > min(least, 0.99)][:NAMED]
+    least = min(max(CLEAR, SURE * np.sqrt(1.0 / failed.sum() + 1.0 / (~failed).sum())), 0.99)
+    apart = {one.name: _distance(one.values, failed) for one in columns}
+    ranked = sorted(columns, key=lambda one: -apart[one.name])
+    shown = [one for one in ranked if apart[one.name] > least][:NAMED]
     if not shown:
         return "spread over the ranges of all variables"
     inside, ranges = np.ones(len(failed), bool), []
@@ -76,20 +75,16 @@ def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
         low, high = (float(end(one.values[failed])) for end in (np.min, np.max))
         inside &= (one.values >= low) & (one.values <= high)
         whole = labels.between(float(one.values.min()), float(one.values.max()), one.unit)
-        ends = (
-            labels.quantity(low, one.unit) if low == high else labels.between(low, high, one.unit)
-        )
+        ends = labels.between(low, high, one.unit)
+        ends = labels.quantity(low, one.unit) if low == high else ends
         ranges.append(f"{one.name} {ends} (range {whole})")
     return f"all at {', '.join(ranges)}, where {int(failed.sum())} of {int(inside.sum())} failed"
 
 
 def _distance(values: Array, failed: Booleans) -> float:
     """Kolmogorov's distance of the distributions of failures and of the others; 0 where a variable does not vary."""
-    at = np.unique(values)
-    shares = [
-        np.searchsorted(np.sort(values[part]), at, "right") / part.sum()
-        for part in (failed, ~failed)
-    ]
+    at, parts = np.unique(values), [np.sort(values[part]) for part in (failed, ~failed)]
+    shares = [np.searchsorted(part, at, "right") / len(part) for part in parts]
     return float(np.abs(shares[0] - shares[1]).max())
 
 

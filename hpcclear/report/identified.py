@@ -78,10 +78,8 @@ def _together(content: Results, record: int) -> str:
     weights = np.linalg.eigh(np.cov(places.T))[1][:, 0]  # the direction of the least variance
     weights = weights / np.abs(weights).sum() * np.sign(weights[np.argmax(np.abs(weights))])
     low, middle, high = np.quantile(places @ weights, (0.025, 0.5, 0.975))
-    terms = " ".join(
-        f"{'-' if weight < 0.0 else '+'} {abs(weight):.2f} {name}"
-        for weight, name in zip(weights, names, strict=True)
-    )
+    signed = (f"{'-' if weight < 0.0 else '+'} {abs(weight):.2f}" for weight in weights)
+    terms = " ".join(map(" ".join, zip(signed, names, strict=True)))
     middle, low, high = (rounded(float(one), *units) for one in (middle, low, high))
     return f"{text}, only {terms.removeprefix('+ ')} = {middle} (95 % interval {low} to {high})"
 
@@ -114,9 +112,8 @@ def _growth(content: Results) -> list[Line]:
     for u, name in enumerate(content["unknown"].values):
         unit = str(content["unit"].values[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
-        found.append(
-            Line(f"growth, {named(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
-        )
+        text = f"{middle} per day (95 % interval {low} to {high}){of}"
+        found.append(Line(f"growth, {named(name)}", text))
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
             limit = quantity(float(content.attrs["limit"]), unit)
@@ -139,11 +136,9 @@ def _advice(content: Results) -> list[Line]:
         for u, unknown in enumerate(content["unknown"].values):
             unit = str(content["unit"].values[u])
             widths = content["expected_half_width"].values[k, :, u]
-            shown = ", ".join(
-                f"{rounded(float(width), unit)} ({count})"
-                for width, count in zip(widths, counts, strict=True)
-            )
-            parts.append(f"{short(unknown)} ± {shown}")
+            pairs = zip(widths, counts, strict=True)
+            shown = (f"{rounded(float(width), unit)} ({count})" for width, count in pairs)
+            parts.append(f"{short(unknown)} ± {', '.join(shown)}")
         if len(parts) > 1:
             related = float(content["expected_correlation"][k, -1])
             parts.append(f"correlation of errors {related:.2f} ({counts[-1]})")
@@ -158,13 +153,10 @@ def warnings(content: Results) -> list[str]:
         doubt = float(content["doubt"][k])
         worst = str(content["feature"].values[int(content["worst_feature"][k])])
         if not int(content["explained"][k]):
-            found.append(
-                f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "
-                f"least is the {worst}. Check the scene, the sensor and the bounds"
-            )
+            text = f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "
+            found.append(f"{text}least is the {worst}. Check the scene, the sensor and the bounds")
         related = float(content["correlation"][k])
         if abs(related) > TOGETHER:
-            found.append(
-                f"the unknowns are not identified separately from {record}: their largest correlation is {related:.2f}"
-            )
+            text = f"the unknowns are not identified separately from {record}: their largest correlation is "
+            found.append(f"{text}{related:.2f}")
     return found

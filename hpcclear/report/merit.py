@@ -98,10 +98,7 @@ def merit(ours: Results, best: Results) -> str:
     if found is Verdict.FAILS:
         return "smallest violation of the constraints"
     if found is Verdict.UNDECIDED:
-        inside = number_in(best, "constraint_excess") <= 0.0
-        return (
-            f"{words} where estimates satisfy the constraints,"
-            if inside
-            else "smallest estimated violation of the constraints"
-        )
+        if number_in(best, "constraint_excess") <= 0.0:
+            return f"{words} where estimates satisfy the constraints,"
+        return "smallest estimated violation of the constraints"
     return words if found is None else f"{words} within the constraints"

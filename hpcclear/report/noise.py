@@ -19,23 +19,16 @@ def joints(response: Results) -> list[list[str]]:
     """Return a row of `HEADER` for each joint with clearance; none where the response has no measures of impact."""
     if "impact_energy" not in response:
         return []
-    names = texts_in(response, "joint")
-    found = []
+    names, found = texts_in(response, "joint"), []
     for joint in (one.joint for one in bearings.bearings(response)):
         at = names.index(joint)
-        flown, reach = (
-            float(np.degrees(response[name].values[at]))
-            for name in ("contact_loss", "contact_loss_limit")
+        ends = (response[name].values[at] for name in ("contact_loss", "contact_loss_limit"))
+        loss, reach = (float(np.degrees(one)) for one in ends)
+        flown = _with(loss, reach, "deg")
+        impacts, lost, force = (
+            _mean(response, name, at) for name in ("impacts", "impact_energy", "rms_contact_force")
         )
-        found.append(
-            [
-                joint,
-                _mean(response, "impacts", at),
-                _mean(response, "impact_energy", at),
-                _with(flown, reach, "deg"),
-                _mean(response, "rms_contact_force", at),
-            ]
-        )
+        found.append([joint, impacts, lost, flown, force])
     return found
 
 
@@ -47,13 +40,9 @@ def frame(response: Results) -> list[tuple[str, str]]:
     if "frame_force_level" in response:
         level = response["frame_force_level"].values
         order = np.argsort(-np.nan_to_num(level, nan=-np.inf))[:LOUDEST]
-        bands = response["band"].values[order]
-        words = ", ".join(
-            f"{one:.1f} dB at {band_name(band)}"
-            for one, band in zip(level[order], bands, strict=True)
-            if np.isfinite(one)
-        )
-        found.append(("highest third octaves", f"{words} (re 1 µN)"))
+        loudest = zip(level[order], response["band"].values[order], strict=True)
+        known = [f"{one:.1f} dB at {band_name(at)}" for one, at in loudest if np.isfinite(one)]
+        found.append(("highest third octaves", f"{', '.join(known)} (re 1 µN)"))
     return found
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
@@ -32,10 +33,8 @@ def lines(of: Recommended) -> Iterator[Line]:
     if own is None or not shares(own):
         return
     names, falls, errors, _ = _inputs(own, "halved")
-    each = [(*one[:2], HALF_WIDTH * one[2]) for one in zip(names, falls, errors, strict=True)]
-    text = (
-        f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}"
-    )
+    listed = _listed(list(zip(names, falls, HALF_WIDTH * errors, strict=True)))
+    text = f"halving the scatter of one input lowers the standard deviation of f by: {listed}"
     if (rest := float(own["unexplained"])) >= 0.005:
         text += f". The cubic fit does not explain {100 * rest:.0f} % of the variance"
     yield Line("tolerances", text)
@@ -62,40 +61,32 @@ def shares(own: Results) -> list[tuple[str, float, float]]:
     return sorted(parts, key=lambda one: -one[1])
 
 
-def tighten(own: Results) -> Iterator[str]:
-    """Yield which inputs of a design (of kind ``contributions``) to tighten first, where there are several."""
+def tighten(own: Results) -> str:
+    """Return which inputs of a design (of kind ``contributions``) to tighten first, and by how much the scatter then falls; ""
+    where there are not several."""
     names, falls, errors, rows = _inputs(own, "halved")
+    if len(rows) < 2:
+        return ""
     prices = own["halving_cost"].values[rows] if "halving_cost" in own else np.array([])
-    if len(rows) > 1:
-        joint = [number_in(own, f"halved_together{end}") for end in ("", "_error")]
-        yield _first(names, falls, errors, prices, joint)
+    chosen, known = to_tighten(falls, errors, prices)
+    if not chosen:
+        return "none: no single input makes a significant part of the scatter"
+    listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
+    fall, error = (number_in(own, f"halved_together{end}") for end in ("", "_error"))
+    if not np.isfinite(fall):
+        return listed  # a file of an earlier version lacks it
+    text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
+    text += f"{100 * fall:.0f} % ± {100 * _upwards(HALF_WIDTH * error, 0.01):.0f} %"
+    return text + (", most for its cost" if known else "")
 
 
-def to_tighten(
-    falls: np.ndarray, errors: np.ndarray, prices: np.ndarray
-) -> tuple[list[int], bool]:  # fmt: skip
+def to_tighten(falls: Array, errors: Array, prices: Array) -> tuple[list[int], bool]:
     """Return which inputs to tighten first, three at most, and whether by their prices: those that bring most, or most for
     what it costs where that is known; `falls`, their `errors` and `prices` (n,)."""
     brings = falls > np.maximum(HALF_WIDTH * errors, WORTH)
     known = prices.size > 0 and bool((prices[brings] > 0.0).all())
     merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls
     return [int(k) for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED], known
-
-
-def _first(
-    names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray, joint: list[float]
-) -> str:
-    """Which inputs to tighten first, and by how much the scatter then falls: `joint` and its error."""
-    chosen, known = to_tighten(falls, errors, prices)
-    if not chosen:
-        return "none: no single input makes a significant part of the scatter"
-    listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
-    fall, error = joint
-    if not np.isfinite(fall):
-        return listed  # a file of an earlier version lacks it
-    text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
-    text += f"{100 * fall:.0f} % ± {100 * _upwards(HALF_WIDTH * error, 0.01):.0f} %"
-    return text + (", most for its cost" if known else "")
 
 
 def _worst(of: Recommended) -> Iterator[Line]:
@@ -157,8 +148,7 @@ def _indices(of: Recommended) -> Iterator[Line]:
     total, error = (found[f"sobol_total{end}"].values for end in ("", "_error"))
     if not total.size or not np.isfinite([total, error]).all():
         return
-    names = texts_in(found, "parameter")
-    parts = [(name, v, HALF_WIDTH * e) for name, v, e in zip(names, total, error, strict=True)]
+    parts = list(zip(texts_in(found, "parameter"), total, HALF_WIDTH * error, strict=True))
     words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
     yield Line("interactions", f"{words}: {_listed(parts)}")
     noise, doubt = (number_in(found, f"sobol_noise{end}") for end in ("", "_error"))

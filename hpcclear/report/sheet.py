@@ -88,31 +88,28 @@ def write_sheet(*places: str | Path, output: str | Path | None = None) -> Path:
     sheet = sheet_of(content, attempt("The first screen", partial(screen_of, content), troubles))
     wanted = (*sheet.screen.figures, gallery.MECHANISM)
     drawn = gallery.figures(content, troubles, wanted, PICTURES)
-    made = tuple(
-        (base64.b64decode(one["png"]), one["caption"])
-        for one in drawn
-        if one["subject"] != "reproduce"  # run times
-    )
+    shown = (one for one in drawn if one["subject"] != "reproduce")  # run times
+    made = tuple((base64.b64decode(one["png"]), one["caption"]) for one in shown)
     figure = draw(sheet._replace(pictures=made))
     return style.save(figure, content.directory / NAME if output is None else output)
 
 
 def sheet_of(content: Content, screen: Screen | None) -> SheetContent:
     """Return what stands on the sheet of results, without its figures."""
-    known = np.isfinite(content.dated)
+    date, about = "", content.attribute
+    if np.isfinite(content.dated):
+        date = f"{datetime.fromtimestamp(content.dated, UTC):%Y-%m-%d}"
     origin = {
-        "machine": content.attribute("about_machine"),
-        "author": content.attribute("about_author"),
-        "revision": content.attribute("about_revision"),
-        "date of the data": f"{datetime.fromtimestamp(content.dated, UTC):%Y-%m-%d}"
-        if known
-        else "",
-        "inputs": content.attribute("scene_hash") and f"SHA-256 {content.attribute('scene_hash')}",
-        "software": "; ".join(filter(None, map(content.attribute, ("source", "versions")))),
-        "processor": content.attribute("processor"),
+        "machine": about("about_machine"),
+        "author": about("about_author"),
+        "revision": about("about_revision"),
+        "date of the data": date,
+        "inputs": about("scene_hash") and f"SHA-256 {about('scene_hash')}",
+        "software": "; ".join(filter(None, map(about, ("source", "versions")))),
+        "processor": about("processor"),
     }
     first = screen or Screen("Not all results have a first screen")
-    title = content.attribute("about_title") or f"Results in {content.directory.resolve().name}"
+    title = about("about_title") or f"Results in {content.directory.resolve().name}"
     return SheetContent(
         replace(first, title=title),
         tuple((label, text) for label, text in origin.items() if text),
@@ -178,19 +175,14 @@ def _blocks(sheet: SheetContent) -> list[list[list[_Cell]]]:
     tables = [[[*map(_Cell, row)] for row in rows] for rows in first.tables()]
     for rows in tables:
         rows[0] = [one._replace(colour=_SOFT) for one in rows[0]]
-    trust = [
-        [_Cell(_MARKS[one.level], _COLOURS[one.level], bold=True), _Cell(one.text)]
-        for one in first.trust
-    ]
-    origin = [
-        [_Cell(label, _SOFT), _Cell(text)] for label, text in sheet.origin if label not in _HEAD
-    ]
+    marks = (_Cell(_MARKS[one.level], _COLOURS[one.level], bold=True) for one in first.trust)
+    rest = [(label, text) for label, text in sheet.origin if label not in _HEAD]
     parts = {
-        "What to trust": trust,
+        "What to trust": [[m, _Cell(one.text)] for m, one in zip(marks, first.trust, strict=True)],
         "Remarks": [[_Cell(text)] for text in (first.remark, first.causes) if text],
         "Assumptions": [[_Cell(text)] for text in sheet.assumptions],
         "Limits": [[_Cell(text)] for text in sheet.limits],
-        "Origin": origin,
+        "Origin": [[_Cell(label, _SOFT), _Cell(text)] for label, text in rest],
     }
     named = [[[_Cell(name, bold=True)], *rows] for name, rows in parts.items() if rows]
     return [[[cell] for cell in head if cell.text], *tables, *named]
@@ -211,11 +203,8 @@ def _placed(
             x, top = MARGIN, y
             for cell, width in zip(row, columns if len(row) > 1 else [INNER], strict=True):
                 step = LEADING * cell.scale * size * POINT
-                lines = _wrapped(cell, width, size)
-                placed += [
-                    (x, top + k * step, cell.scale * size, line, cell)
-                    for k, line in enumerate(lines)
-                ]
+                lines, own = _wrapped(cell, width, size), cell.scale * size
+                placed += [(x, top + k * step, own, line, cell) for k, line in enumerate(lines)]
                 y, x = max(y, top + len(lines) * step), x + width + GAP
         y += 0.5 * size * POINT
     return placed, y
@@ -307,10 +296,11 @@ def draw(sheet: SheetContent) -> "style.Figure":
         axes = figure.add_axes(box)
         axes.imshow(image, aspect="auto", interpolation="none")
         axes.set_axis_off()
-        below = top + high + 1.0
-        placed += [
-            (x, below + n * step, SIZES[-1], line, _Cell("", _SOFT)) for n, line in enumerate(lines)
-        ]
+        look, heights = (
+            (SIZES[-1], _Cell("", _SOFT)),
+            top + high + 1.0 + step * np.arange(len(lines)),
+        )
+        placed += [(x, y, look[0], line, look[1]) for y, line in zip(heights, lines, strict=True)]
     for k, word in enumerate(("Name", "Date", "Signature")):
         x = MARGIN + k * (INNER + GAP) / 3.0
         ends, height = [x / WIDTH, (x + (INNER - 2.0 * GAP) / 3.0) / WIDTH], MARGIN + 3.5

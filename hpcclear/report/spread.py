@@ -145,13 +145,9 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
     unit, drawn = str(samples["objective"].attrs["units"]), method in DRAWN
     lines = [Line("sampling", DRAWN[method])] if drawn else []
     lines += _moments(known, unit, drawn)
-    lines += [
-        Line(
-            f"P{100 * level:.0f} of f" if level != 0.5 else "median of f",
-            *_quantile(f, level, unit, drawn),
-        )
-        for level in (LEVELS if drawn else LEVELS[:1])
-    ]
+    for level in LEVELS if drawn else LEVELS[:1]:
+        label = f"P{100 * level:.0f} of f" if level != 0.5 else "median of f"
+        lines.append(Line(label, *_quantile(f, level, unit, drawn)))
     for joint in samples["joint"].values if drawn and "peak_contact_force" in samples else ():
         peak = samples["peak_contact_force"].sel(joint=joint).values
         if np.nanmax(peak, initial=0.0) > 0.0:
@@ -174,11 +170,8 @@ def in_time(samples: Results) -> list[Line]:
     )
     if "objective" in samples.attrs:
         remedy = "a response has one (hpcclear simulate)"
-    lines = []
-    for label, column in (
-        ("half-width of f", name),
-        ("cycle-to-cycle std. dev.", "objective_spread"),
-    ):
+    lines, columns = [], {"half-width of f": name, "cycle-to-cycle std. dev.": "objective_spread"}
+    for label, column in columns.items():
         parts = samples[column].values / f if column in samples else np.array([])
         if np.isfinite(parts).any():
             text = f"median {100 * np.nanmedian(parts):.2f} %, largest {100 * np.nanmax(parts):.2f} % of f"
@@ -215,10 +208,8 @@ def side_by_side(
 def rows_of(found: Lines) -> list[list[str]]:
     """Return the texts of `side_by_side` in rows: a label, then a text of each samples, "" where one has no such line."""
     names = dict.fromkeys(label for lines in found.values() for label in lines)
-    return [
-        [label, *(lines[label].text if label in lines else "" for lines in found.values())]
-        for label in names
-    ]
+    every = ([lines.get(label, Line("", "")).text for lines in found.values()] for label in names)
+    return [[label, *texts] for label, texts in zip(names, every, strict=True)]
 
 
 def remarks(samples: Results) -> list[str]:

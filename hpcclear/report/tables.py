@@ -70,7 +70,7 @@ def to_table(content: xr.Dataset | Results, units: Sequence[str] = ()) -> DataFr
     table = pd.DataFrame(made.columns)
     if len(made.rows) > 1:  # places of a grid that nothing fills
         known = [
-            h for h in made.columns if h not in made.keys and made.columns[h].dtype.kind == "f"
+            h for h, one in made.columns.items() if h not in made.keys and one.dtype.kind == "f"
         ]
         table = table[table[known].notna().any(axis=1)].reset_index(drop=True) if known else table
     origin = {key: str(content.attrs.get(key, "")) for key in ("title", "scene", "scene_hash")}
@@ -114,10 +114,8 @@ class _Table:
             label = " ".join(_label(self.content, d, k) for d, k in zip(across, place, strict=True))
             heading = " ".join(part for part in (name, label, unit and f"[{unit}]") if part)
             one = ordered.isel(dict(zip(across, place, strict=True)))
-            self.units[heading], self.words[heading] = (
-                unit,
-                str(variable.attrs.get("long_name", name)),
-            )
+            self.units[heading] = unit
+            self.words[heading] = str(variable.attrs.get("long_name", name))
             if alone:
                 self.single[heading] = one.item()
             else:
@@ -173,12 +171,9 @@ class Units:
             return _words(variable), ""
         if unit in ("", "1") or values.dtype.kind != "f":
             return values, ""
-        chosen = self.chosen(unit, self._own(variable))
-        return (
-            (values, labels.plain(unit))
-            if not chosen
-            else (values / float(factor(chosen, unit)), chosen)
-        )
+        if chosen := self.chosen(unit, self._own(variable)):
+            return values / float(factor(chosen, unit)), chosen
+        return values, labels.plain(unit)
 
     def chosen(self, unit: str, own: Sequence[str] = ()) -> str:
         """The unit that shows quantities of a unit of SI, before which come those of a variable's own entry; "" for SI."""

@@ -69,18 +69,13 @@ def sentences(found: Results) -> list[str]:
     """Return a sentence for each of `TARGETS`, and one for the scene's own settings."""
     words = []
     for target in TARGETS:
-        way = cheapest(found, target)
-        words.append(
-            f"For an error of f of {target * 100:g} %: {way.words}; {seconds(way.seconds)} of one core per design."
-            if way is not None
-            else f"For an error of f of {target * 100:g} %: no measured setting reaches it. Try numerics.target_error."
-        )
-    own = settings(found)
-    if own is not None:
-        words.append(
-            f"Your settings ({own.words}): error of at most {own.error * 100:.2g} %, "
-            f"{seconds(own.seconds)} of one core per design."
-        )
+        text = "no measured setting reaches it. Try numerics.target_error."
+        if way := cheapest(found, target):
+            text = f"{way.words}; {seconds(way.seconds)} of one core per design."
+        words.append(f"For an error of f of {target * 100:g} %: {text}")
+    if own := settings(found):
+        text = f"error of at most {own.error * 100:.2g} %, {seconds(own.seconds)} of one core per design."
+        words.append(f"Your settings ({own.words}): {text}")
     return words
 
 
@@ -117,11 +112,7 @@ def settings(found: Results) -> Way | None:
     numerics = scene.numerics
     if numerics.target_error is not None:
         way = cheapest(found, numerics.target_error)
-        return (
-            None
-            if way is None
-            else way._replace(words=f"target_error {_short(numerics.target_error)}")
-        )
+        return way and way._replace(words=f"target_error {_short(numerics.target_error)}")
     if not isinstance(numerics.averaged_revolutions, int):
         return None
     return _own(found, scene)
@@ -178,10 +169,11 @@ def _ways_of(found: Results, k: int, bias: float) -> Iterator[Way]:
         yield Way(price * (count + wait), float(np.hypot(bias, np.sqrt(variance / count))), words)
     if "averaging_error" not in found:
         return
-    for row, transient in zip(_averaging(found), found["transient"].values.tolist(), strict=True):
-        for one, averaged in zip(row, found["averaged"].values.tolist(), strict=True):
-            words = f"rtol {rtol}, {transient} transient and {averaged} averaged revolutions"
-            yield Way(price * (transient + averaged), float(np.hypot(bias, one)), words)
+    transients, averages = (found[name].values.tolist() for name in ("transient", "averaged"))
+    for (row, column), one in np.ndenumerate(_averaging(found)):
+        transient, averaged = transients[row], averages[column]
+        words = f"rtol {rtol}, {transient} transient and {averaged} averaged revolutions"
+        yield Way(price * (transient + averaged), float(np.hypot(bias, one)), words)
 
 
 def _short(value: float) -> str:

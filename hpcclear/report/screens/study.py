@@ -268,7 +268,7 @@ def _bars(of: Recommended) -> tuple[list[ShareBar], str]:
     """Contributions to the variance of the recommended design; where these are not known, total Sobol indices."""
     own, found = of.of_best("contributions"), of.files.get("sensitivity")
     if own is not None and np.isfinite(own["contribution"].values).any():
-        return list(map(ShareBar._make, scatter.shares(own))), "".join(scatter.tighten(own))
+        return list(map(ShareBar._make, scatter.shares(own))), scatter.tighten(own)
     if found is None or "sobol_total" not in found:
         return [], ""
     values = (found[name].values for name in ("sobol_total", "sobol_total_error"))
