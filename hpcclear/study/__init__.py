@@ -86,9 +86,8 @@ def run_study(
         If requested to end early; everything finished is on disk.
     """
     if isinstance(ranks, int) and ranks > 1:
-        return launched.launch(
-            scene, Path(directory), ranks, fresh=fresh, progress_style=progress_style
-        )
+        where, style = Path(directory), progress_style
+        return launched.launch(scene, where, ranks, fresh=fresh, progress_style=style)
     if isinstance(ranks, int):
         ranks = alone()
     study = scene.required_study
@@ -125,10 +124,8 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     compile_ahead(scene, session.ranks, points, style)
     announce = Announcer(scene, style).announced
     simulations = Simulations(scene, session.ranks, checkpoint, style)
-    directory = session.place.output
-    run = StudyRun(
-        scene, directory, session.ranks, checkpoint, simulations, session.notify, announce
-    )
+    where = scene, session.place.output, session.ranks, checkpoint, simulations
+    run = StudyRun(*where, session.notify, announce)
     with saving(checkpoint.flush):  # samples of small stages wait for the next save
         carry_out(run, certificate_extent)
     return run.times

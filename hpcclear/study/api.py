@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,10 +52,6 @@ def effects(
     from hpcclear.ensemble.trial import Wanted
     from hpcclear.study.extent import certificate_extent
 
-    most, budget = certificate_extent(scene, samples)
-    wanted = Wanted(tolerance, most, budget, forces)
-    return in_process(
-        lambda place, ranks, options: run_effects(scene, place, ranks, options, wanted),
-        output,
-        progress,
-    )
+    wanted = Wanted(tolerance, *certificate_extent(scene, samples), forces)
+    run = partial(run_effects, scene, wanted=wanted)
+    return in_process(run, output, progress)

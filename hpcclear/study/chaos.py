@@ -33,11 +33,9 @@ def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
     """Standard deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where
     all failed. Raises InputError if all simulations fail."""
     batches = []
-    for choice in choices:
-        points = monte_carlo(
-            run.scene, PAIRS, random=run.study.case(choice.case).random,
-            design=dict(choice.design), purpose="chaos",
-        )  # fmt: skip
+    for one in choices:
+        random, design = run.study.case(one.case).random, dict(one.design)
+        points = monte_carlo(run.scene, PAIRS, random=random, design=design, purpose="chaos")
         batches.append(run.simulations.filled(points.names, points.values))
     values = np.stack([batch.values for batch in batches])
     perturbed = values * (1.0 + PERTURBATION)
@@ -66,11 +64,6 @@ def split(pairs: np.ndarray) -> tuple[float, float, float]:
 def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
     """Write chaos.nc of what `simulate` found."""
     coords = {"design": np.array([choice.name for choice in choices])}
-    data = {
-        "chaos_deviation": found["deviation"],
-        "chaos_share": found["share"],
-        "chaotic": found["chaotic"],
-        "pairs": np.full(len(choices), PAIRS),
-    }
-    content = dataset.dataset("chaos", coords, data, objective=run.scene.objective)
-    run.write(content)
+    data = {f"chaos_{name}": found[name] for name in ("deviation", "share")}
+    data |= {"chaotic": found["chaotic"], "pairs": np.full(len(choices), PAIRS)}
+    run.write(dataset.dataset("chaos", coords, data, objective=run.scene.objective))

@@ -42,9 +42,8 @@ def of_designs(
     ``halved_together`` of the inputs to tighten first, ``unexplained``, and their ``_error``, (n,).
     """
     names = inputs_of(run)
-    result: Result = {
-        name: np.full((len(choices), len(names)), np.nan) for name in (*_NAMES, "group")
-    }
+    shape = len(choices), len(names)
+    result: Result = {name: np.full(shape, np.nan) for name in (*_NAMES, "group")}
     result |= {name: np.full(len(choices), np.nan) for name in _OF_ALL}
     result["halving_cost"] = _prices(run, choices, names)
     for row, (choice, one) in enumerate(zip(choices, made, strict=True)):
@@ -64,9 +63,8 @@ def of_designs(
         parts = (found.share, found.share_error, found.halved, found.halved_error)
         for name, part in zip(_NAMES, parts, strict=True):
             result[name][row, columns] = part
-        first = to_tighten(found.halved, found.halved_error, result["halving_cost"][row, columns])[
-            0
-        ]
+        prices = result["halving_cost"][row, columns]
+        first, _ = to_tighten(found.halved, found.halved_error, prices)
         both = (*found.together(first), found.rest, found.rest_error)
         for name, number in zip(_OF_ALL, both, strict=True):
             result[name][row] = number

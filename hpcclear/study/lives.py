@@ -68,12 +68,10 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
     (run.directory / FOLDER).mkdir(exist_ok=True)
     cases = run.study.cases
     ends = [name for case in cases for name in (f"{case.name} original", *case.ends)]
-    rows = [
-        _over_life(run, scene, choice) if choice.name in ends else (np.nan,) * 4
-        for choice in designs
-    ]
-    names = ("mean", "mean_reach", "deviation", "deviation_reach")
-    return dict(zip(names, np.array(rows).T, strict=True))
+    table = np.full((len(designs), 4), np.nan)
+    for row, choice in zip(table, designs, strict=True):
+        row[:] = _over_life(run, scene, choice) if choice.name in ends else np.nan
+    return dict(zip(("mean", "mean_reach", "deviation", "deviation_reach"), table.T, strict=True))
 
 
 def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]:
@@ -89,17 +87,12 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     oldest = max(row.cycles or 0.0 for row in scene.required_study.worn)
     parts, at = (np.arange(AGES) + 0.5) / AGES, found["cycle"].values
     values = np.full((found.sizes["life"], AGES), np.nan)
-    for k, (end, f) in enumerate(
-        zip(found["ended"].values, found["objective"].values, strict=True)
-    ):
-        if found["end_reason"][k] != "failed":
-            values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
-    estimates: list[float] = []
+    for k in np.flatnonzero(found["end_reason"].values != "failed"):
+        end, f = found["ended"][k], found["objective"][k]
+        values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
+    estimates, level = list[float](), run.study.verification.confidence
     for one in moments(values):
-        sure = one.freedom > 0
-        reach = (
-            one.error * student(run.study.verification.confidence, one.freedom) if sure else np.nan
-        )
+        reach = one.error * student(level, one.freedom) if one.freedom > 0 else np.nan
         estimates += [one.value, reach]
     return tuple(estimates)
 

@@ -70,16 +70,14 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     settings = run.study.verification
     chosen = compared(run, designs)
     revolutions = settings.response_revolutions * settings.response_windows
-    table = responses_of(
-        run.scene,
-        [_changes(run, choice, revolutions) for _, choice in chosen],
-        partial(_statistics, windows=settings.response_windows),
-        (settings.response_windows, len(STATISTICS), _quantities(run.scene)),
-        run.ranks,
-        "responses: simulations",
-        copies=settings.response_copies,
-        together=TOGETHER,
+    windows, copies = settings.response_windows, settings.response_copies
+    variants = [_changes(run, choice, revolutions) for _, choice in chosen]
+    shape, work = (
+        (windows, len(STATISTICS), _quantities(run.scene)),
+        partial(_statistics, windows=windows),
     )
+    what = run.scene, variants, work, shape, run.ranks, "responses: simulations"
+    table = responses_of(*what, copies=copies, together=TOGETHER)
     return {"names": np.array([name for name, _ in chosen]), "statistics": table}
 
 
@@ -93,10 +91,10 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             response = simulated(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
-            run.notify(
-                f"The response of {name} has no file: its simulation ended as {status.name.lower()}: {status.message}. "
-                f"{status.remedy}"
+            why = (
+                f"its simulation ended as {status.name.lower()}: {status.message}. {status.remedy}"
             )
+            run.notify(f"The response of {name} has no file: {why}")
             continue
         content = _steady(scene, response)
         made_by = {**scene.origin, "scene": scene.to_toml(), **program()}
@@ -119,13 +117,13 @@ def _statistics(scene: Scene, response: Results, windows: int) -> Array:
         return np.full(shape, np.nan)
     steady = _steady(scene, response)
     widths = {"contact_force": len(scene.joint_labels), "crank_moment": 1, "slider_acceleration": 1}
-    columns = [
-        steady[name].values.reshape(-1, width)
-        if name in steady  # a linkage may have no slider
-        else np.full((steady.sizes["time"], width), np.nan)
-        for name, width in widths.items()
-    ]
-    parts = np.array_split(np.hstack(columns), windows)
+    table = np.full((steady.sizes["time"], sum(widths.values())), np.nan)
+    begin = 0
+    for name, width in widths.items():
+        if name in steady:  # a linkage may have no slider
+            table[:, begin : begin + width] = steady[name].values.reshape(-1, width)
+        begin += width
+    parts = np.array_split(table, windows)
     found = [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
     return np.array(found)
 

@@ -18,6 +18,8 @@ from hpcclear.scene.study import Study
 from hpcclear.study.simulations import Simulations
 
 Result = dict[str, np.ndarray]
+Work = Callable[..., Mapping[str, ArrayLike]]
+"""Makes the result of a stage, from its run and further arguments."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +62,7 @@ class StudyRun:
         """A stream of random numbers for one purpose."""
         return generator(self.study.seed, *labels)
 
-    def stage(
-        self, name: str, work: Callable[..., Mapping[str, ArrayLike]], *arguments: object
-    ) -> Result:
+    def stage(self, name: str, work: Work, *arguments: object) -> Result:
         """What `work` returns for the run and further arguments; from disk when done before.
 
         Either way the samples that follow are numbered alike, so that a run that was interrupted
@@ -71,9 +71,7 @@ class StudyRun:
         self.announce(name)
         return self._kept(name, self.ranks.stage(name), work, arguments)
 
-    def part(
-        self, name: str, work: Callable[..., Mapping[str, ArrayLike]], *arguments: object
-    ) -> Result:
+    def part(self, name: str, work: Work, *arguments: object) -> Result:
         """The same for a part of a stage, kept by itself: long stages lose a part at most."""
         return self._kept(name, nullcontext(), work, arguments)
 
@@ -81,22 +79,20 @@ class StudyRun:
         self,
         name: str,
         context: AbstractContextManager[None],
-        work: Callable[..., Mapping[str, ArrayLike]],
+        work: Work,
         arguments: tuple[object, ...],
     ) -> Result:
         found = self.checkpoint.load_stage(name)
         if found is None or not self._has_samples(int(found["next_sample"])):
             with context:
                 self.ranks.raise_if_stopped()
-                result = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
-                result["next_sample"] = np.asarray(self.simulations.next)
+                found = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
+                found["next_sample"] = np.asarray(self.simulations.next)
                 with self.ranks.writing():
                     self.checkpoint.flush()
-                    self.checkpoint.save_stage(name, result)
-            found = result
-        found = dict(found)
-        self.simulations.next = int(found.pop("next_sample"))
-        return found
+                    self.checkpoint.save_stage(name, found)
+        self.simulations.next = int(found["next_sample"])
+        return {key: value for key, value in found.items() if key != "next_sample"}
 
     def _has_samples(self, count: int) -> bool:
         """Whether the samples that a kept stage stands on are there; a file of them may be damaged."""
@@ -114,10 +110,9 @@ class StudyRun:
                 own.attrs["options"] = "; ".join(row.name for row in variable.rows)
             if own is not None and variable.silent:
                 own.attrs["of_random_inputs"] = ", ".join(variable.input_paths)
+        file = self.directory / (name or f"{content.attrs['hpcclear_kind']}.nc")
         with self.ranks.stage("results"), self.ranks.writing():
-            dataset.write(
-                content, self.directory / (name or f"{content.attrs['hpcclear_kind']}.nc")
-            )
+            dataset.write(content, file)
 
     def write_samples(self) -> None:
         """Write samples.nc: all simulations so far, the points that surfaces and models are made of."""
@@ -126,13 +121,6 @@ class StudyRun:
         records, values = self.checkpoint.contents()
         before = records["sample"] < self.simulations.next
         units = {variable.name: variable.unit for variable in self.study.variables}
-        content = dataset.samples_dataset(
-            self.study.names,
-            values[before],
-            units,
-            records[before],
-            objective=self.scene.objective,
-            words=self.words,
-            joints=self.scene.joint_labels,
-        )
-        self.write(content)
+        found = self.study.names, values[before], units, records[before]
+        about = None, self.scene.objective, self.words, self.scene.joint_labels
+        self.write(dataset.samples_dataset(*found, *about))

@@ -11,22 +11,15 @@ from hpcclear.results.content import Results
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
+from hpcclear.statistics.sensitivity import intervals
 from hpcclear.statistics.sensitivity.convergence import best_estimates, convergence_intervals
-from hpcclear.statistics.sensitivity.intervals import (
-    IntervalDesign,
-    IntervalSettings,
-    analyse_intervals,
-    design_intervals,
-)
+from hpcclear.statistics.sensitivity.intervals import IntervalDesign, IntervalSettings
 from hpcclear.statistics.sensitivity.selection import select_influential
 from hpcclear.statistics.sensitivity.sobol import analyse_sobol, noise_share, sobol_design
+from hpcclear.statistics.surrogate import surface_search
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
-from hpcclear.statistics.surrogate.surface_search import (
-    SearchSettings,
-    SurfaceSearch,
-    fit_until_accepted,
-)
+from hpcclear.statistics.surrogate.surface_search import SearchSettings, SurfaceSearch
 from hpcclear.study.run import Result, StudyRun
 
 STAGE = "sensitivity"
@@ -121,7 +114,7 @@ def _designs(run: StudyRun) -> list[IntervalDesign]:
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
+        found.append(intervals.design_intervals(_bounds(run, names), clearances, rng, laid_out))
     return found
 
 
@@ -166,7 +159,7 @@ def _first_order(run: StudyRun, made: Sequence[Sampled]) -> Result:
         result[name] = np.full(of_clearance, np.nan)
     fractions = (1.0 - settings.shrink) ** np.arange(settings.rounds)
     for k, (names, design, values) in enumerate(made):
-        history = analyse_intervals(design, values)
+        history = intervals.analyse_intervals(design, values)
         found = convergence_intervals(history)
         slope, uncertainty = best_estimates(history, found)
         at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
@@ -175,10 +168,8 @@ def _first_order(run: StudyRun, made: Sequence[Sampled]) -> Result:
         for name in ("r2", "rmae", "leave_one_out_r2"):
             result[name][k] = getattr(history, name)
         result["converged"][k][:, at] = found.found
-        for name, index in (
-            ("convergence_interval", found.interval),
-            ("plateau_interval", found.plateau),
-        ):
+        reached = {"convergence_interval": found.interval, "plateau_interval": found.plateau}
+        for name, index in reached.items():
             result[name][k][:, at] = np.where(index >= 0, fractions[index], np.nan)
         result["best_sensitivity"][k][:, at] = slope * span
         result["uncertainty"][k][:, at] = uncertainty * span
@@ -210,15 +201,11 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     where = [(k, name) for k, names in enumerate(inputs) for name in names]
     names = [name for _, name in where]
     at = _columns(run, names)
-    slope = np.stack(
-        [result["best_sensitivity"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
-    )
-    error = np.stack(
-        [result["uncertainty"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
-    )
-    chosen = select_influential(
-        names, slope, error, np.ones(len(names)), fraction=run.study.sensitivity.influence
-    )
+    rows = [k for k, _ in where]
+    every = (result[key][rows, :, at].T for key in ("best_sensitivity", "uncertainty"))
+    slope, error = map(np.ascontiguousarray, every)
+    fraction = run.study.sensitivity.influence
+    chosen = select_influential(names, slope, error, np.ones(len(names)), fraction=fraction)
     influence = np.full(len(run.study.names), np.nan)
     for column, place in enumerate(at):
         known = chosen.effect[:, column]
@@ -231,10 +218,8 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
 def _accepted(run: StudyRun, sampled: Sequence[Sampled]) -> Result:
     """The surface over each global interval; a refused one gets more points or another order."""
     shape = (len(sampled), run.study.sensitivity.levels)
-    result: Result = {
-        name: np.full(shape, np.nan)
-        for name in ("surface_r2", "surface_rmae", "surface_r2_explained", "surface_rmae_mean")
-    }
+    reasons = ("r2", "rmae", "r2_explained", "rmae_mean")
+    result: Result = {f"surface_{name}": np.full(shape, np.nan) for name in reasons}
     result |= {name: np.zeros(shape, np.int64) for name in ("surface_order", "surface_points")}
     result["surface_accepted"] = np.zeros(shape, np.int8)
     made = {(k, c): _surface(run, sampled[k], c) for k, c in np.ndindex(*shape)}
@@ -248,10 +233,8 @@ def _accepted(run: StudyRun, sampled: Sequence[Sampled]) -> Result:
     if any(one.design.settings.chosen for one in sampled):
         result["surface_terms"] = np.zeros(shape, np.int64)
     for (k, c), (reached, order, count, terms, accepted) in made.items():
-        if reached is not None:
-            result["surface_r2"][k, c], result["surface_rmae"][k, c] = reached.r2, reached.rmae
-            result["surface_r2_explained"][k, c] = reached.r2_explained
-            result["surface_rmae_mean"][k, c] = reached.rmae_mean
+        for name in reasons if reached is not None else ():
+            result[f"surface_{name}"][k, c] = getattr(reached, name)
         result["surface_order"][k, c], result["surface_points"][k, c] = order, count
         result["surface_accepted"][k, c] = accepted
         if "surface_terms" in result:
@@ -311,7 +294,7 @@ def _searched(
             batches.append(run.simulations.designs((*inputs, parameter(run)), where).values)
         return dict(zip(asked, _simulated(run, batches), strict=True))
 
-    fit_until_accepted(evaluate, searches)
+    surface_search.fit_until_accepted(evaluate, searches)
     return searches
 
 
@@ -323,11 +306,8 @@ def _sobol_points(run: StudyRun) -> Array:
     names = run.study.names
     points = snapped(run.study, names, sobol_design(bounds, rows, run.rng("sobol")))
     near = points[: _beside(run.study)]
-    steps = (
-        NEARBY
-        * (bounds[:, 1] - bounds[:, 0])
-        * run.rng("sobol noise").uniform(-1.0, 1.0, near.shape)
-    )
+    moved = run.rng("sobol noise").uniform(-1.0, 1.0, near.shape)
+    steps = NEARBY * (bounds[:, 1] - bounds[:, 0]) * moved
     near = snapped(run.study, names, np.clip(near + steps, *bounds.T))
     return np.concatenate([points, near])
 

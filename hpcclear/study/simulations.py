@@ -22,34 +22,18 @@ SHOWN = {"pairs": "runs at two tolerances", "chaos": "perturbed runs"}
 
 
 class Simulations:
-    """Simulates batches of designs, numbered one after the other through the whole study.
+    """Simulates batches of designs of a scene with a study, numbered one after the other through the whole study.
 
-    What an earlier run of the same command finished is taken from the checkpoint.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    checkpoint : Checkpoint
-        Its names are the study variables.
-    style : str
-        How progress is shown.
-
-    Attributes
-    ----------
-    style : str
-    next : int
-        Number of the next sample. A stage that is not done again sets it to where it had ended.
+    What an earlier run of the same command finished is taken from the checkpoint, whose names are the study variables.
+    `style`: how progress is shown; `next`: number of the next sample. A stage that is not done again sets it to where it had
+    ended.
     """
 
     def __init__(
         self, scene: Scene, ranks: Ranks, checkpoint: Checkpoint, style: Style = "auto"
     ) -> None:
-        self.scene = scene
-        self.next = 0
-        self._ranks = ranks
-        self._checkpoint = checkpoint
-        self.style = style
+        self.scene, self.style, self.next = scene, style, 0
+        self._ranks, self._checkpoint = ranks, checkpoint
         self._variables = scene.required_study.variables
 
     def designs(self, names: Sequence[str], coordinates: Array) -> Points:
@@ -71,18 +55,13 @@ class Simulations:
                 continue
             numbers = {self.scene.number(path) for path in variable.paths}
             if len(numbers) > 1:
-                raise InputError(
-                    f"study.variables.{variable.name}",
-                    sorted(numbers),
-                    "a model leaves it out, but the entries that it drives differ in the scene",
-                    "Make these entries equal, or give each a variable of its own",
-                )
+                key = f"study.variables.{variable.name}"
+                reason = "a model leaves it out, but the entries that it drives differ in the scene"
+                remedy = "Make these entries equal, or give each a variable of its own"
+                raise InputError(key, sorted(numbers), reason, remedy)
             columns.append(np.full(len(values), self.scene.baseline(variable.name)))
-        points = Points(
-            tuple(variable.name for variable in self._variables),
-            np.column_stack(columns),
-            tuple(variable.paths for variable in self._variables),
-        )
+        every, paths = zip(*((one.name, one.paths) for one in self._variables), strict=True)
+        points = Points(every, np.column_stack(columns), paths)
         check_points(self.scene, points)
         return points
 
@@ -121,15 +100,9 @@ class Simulations:
     def _records(self, points: Points, stage: str) -> np.ndarray:
         style = self.style if len(points) >= 1000 else "quiet"
         progress = Progress(SHOWN.get(stage.partition("-")[0], stage), style=style)
-        records = sample_points(
-            self.scene,
-            points,
-            self._ranks,
-            self._checkpoint,
-            progress,
-            stage=f"{stage}: simulations",
-            first=self.next,
-        )
+        where = self._ranks, self._checkpoint, progress
+        name = f"{stage}: simulations"
+        records = sample_points(self.scene, points, *where, stage=name, first=self.next)
         with self._ranks.writing():  # a long fit may follow
             self._checkpoint.flush_when_due()
         self.next += len(points)
@@ -151,9 +124,5 @@ def _refuse_if_all_failed(records: np.ndarray, stage: str) -> None:
         return
     codes, counts = np.unique(records["status"], return_counts=True)
     worst = Status(int(codes[counts.argmax()]))
-    raise InputError(
-        stage,
-        len(records),
-        f"all of these simulations failed, most often because {worst.message}",
-        worst.remedy.capitalize(),
-    )
+    reason = f"all of these simulations failed, most often because {worst.message}"
+    raise InputError(stage, len(records), reason, worst.remedy.capitalize())

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from hpcclear.ranks.progress import duration
 from hpcclear.ranks.terminal import Style, announce
 from hpcclear.scene import Scene
+from hpcclear.scene.study import Study
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
     budget,
@@ -110,9 +111,7 @@ def _search(run: StudyRun, models: Models) -> SearchOutcome:
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
     result = run.stage("search", search.search, [*ends, *between], models.searched)
-    return SearchOutcome(
-        to_verify(run, ends, between, result), [str(text) for text in result["remarks"]]
-    )
+    return SearchOutcome(to_verify(run, ends, between, result), [*map(str, result["remarks"])])
 
 
 def to_verify(
@@ -142,11 +141,9 @@ def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
 
 
 def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
-    table, true = verified.table, verified.true
-    printed = printed_moments(run.scene, table.choices)
-    verification.write(
-        run, table, true, models.searched, verified.remarks, printed, over_life or {}
-    )
+    table, printed = verified.table, printed_moments(run.scene, verified.table.choices)
+    found = verified.true, models.searched, verified.remarks
+    verification.write(run, table, *found, printed, over_life or {})
 
 
 def _worst(run: StudyRun, verified: Verified) -> None:
@@ -165,26 +162,6 @@ def _responses(run: StudyRun, verified: Verified) -> Result:
     return series
 
 
-def _claims(run: StudyRun, sensitivity: Result | None, models: Models, series: Result) -> None:
-    claims.write(run, claims.judge(run, sensitivity, models.kept, series))
-
-
-def _of_wear(scene: Scene) -> dict[str, int]:
-    return {"wear": lives.simulations(scene)}
-
-
-def _of_sensitivity(scene: Scene) -> dict[str, int]:
-    return {"sensitivity": sensitivities.simulations(scene.required_study)}
-
-
-def _of_surrogates(scene: Scene) -> dict[str, int]:
-    return {"kriging": surrogates.simulations(scene.required_study)}
-
-
-def _of_search(scene: Scene) -> dict[str, int]:
-    return {"search": sum(budget.simulations(scene.required_study))}
-
-
 def _designs(scene: Scene) -> int:
     """How many designs are verified at most."""
     study = scene.required_study
@@ -200,53 +177,50 @@ def _of_verification(scene: Scene) -> dict[str, int]:
     failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
     each = truth.expected(study) + failing // len(study.cases)
     designs = _designs(scene)
-    before = (_of_wear, _of_sensitivity, _of_surrogates, _of_search)
-    others = designs * each + sum(sum(stage(scene).values()) for stage in before)
+    before = (
+        stage for stage in STAGES if stage.name in ("wear", "sensitivity", "surrogates", "search")
+    )
+    others = designs * each + sum(sum(stage.samples(scene).values()) for stage in before)
     pairs = tolerance.simulations(study, designs, others)
     return {"verification": designs * each, "pairs": pairs}
 
 
-def _of_lives(scene: Scene) -> dict[str, int]:
-    return {"lives": lives.simulations_of_designs(scene)}
+def _samples(part: str, count: Callable[[Scene], int]) -> Callable[[Scene], Mapping[str, int]]:
+    """Samples of a stage that has one part."""
+    return lambda scene: {part: count(scene)}
 
 
-def _of_chaos(scene: Scene) -> dict[str, int]:
-    return {"chaos": chaos.designs(scene.required_study) * 2 * chaos.PAIRS}
+def _of_study(count: Callable[[Study], Any]) -> Callable[[Scene], Any]:
+    """The same of a study as of a scene that has it."""
+    return lambda scene: count(scene.required_study)
 
 
-def _of_readings(scene: Scene) -> dict[str, int]:
-    return {"readings": readings.simulations(scene)[0]}
-
-
-def _worn(scene: Scene) -> bool:
-    return bool(scene.required_study.worn)
+_worn = _of_study(lambda study: bool(study.worn))
 
 
 STAGES = (
     Stage(
         "wear", lambda run: run.of(lives.known(run)), applies=_worn,
-        words={"wear": "wear over the service life"}, samples=_of_wear,
+        words={"wear": "wear over the service life"}, samples=_samples("wear", lives.simulations),
     ),
     Stage(
         "effects", certificate.certify, needs=("extent",),
-        applies=lambda scene: scene.required_study.certificate is not None,
+        applies=_of_study(lambda study: study.certificate is not None),
         words={"effects": "effect screening"}, writes=("effects",),
     ),
     Stage(
-        "sensitivity", _sensitivity, applies=lambda scene: bool(scene.required_study.groups),
-        words={"sensitivity": "sensitivity analysis"}, writes=("sensitivity",), samples=_of_sensitivity,
+        "sensitivity", _sensitivity, applies=_of_study(lambda study: bool(study.groups)),
+        words={"sensitivity": "sensitivity analysis"}, writes=("sensitivity",),
+        samples=_samples("sensitivity", _of_study(sensitivities.simulations)),
     ),
     Stage(
-        "surrogates", _surrogates,
-        words={"kriging": "surrogate models"}, writes=("samples", "kriging"), samples=_of_surrogates,
+        "surrogates", _surrogates, words={"kriging": "surrogate models"}, writes=("samples", "kriging"),
+        samples=_samples("kriging", _of_study(surrogates.simulations)),
     ),
     Stage(
-        "search", _search, needs=("surrogates",),
-        words={
-            "optimisation": "search on the surrogate",
-            "search": "search by simulation",
-        },
-        writes=("front",), samples=_of_search,
+        "search", _search, needs=("surrogates",), writes=("front",),
+        words={"optimisation": "search on the surrogate", "search": "search by simulation"},
+        samples=_samples("search", _of_study(lambda study: sum(budget.simulations(study)))),
     ),
     Stage(
         "verification", _verification, needs=("surrogates", "search"),
@@ -256,7 +230,8 @@ STAGES = (
         "lives",
         lambda run, written, verified: run.stage("lives", lives.of_designs, written, verified.table.choices),
         needs=("scene", "verification"), applies=_worn,
-        words={"lives": "wear of the baseline and the best designs"}, samples=_of_lives,
+        words={"lives": "wear of the baseline and the best designs"},
+        samples=_samples("lives", lives.simulations_of_designs),
     ),
     Stage("front", _front, needs=("surrogates", "verification", "lives"), writes=("verification",)),
     Stage(
@@ -264,23 +239,28 @@ STAGES = (
         needs=("verification",), writes=("contributions",),
     ),
     Stage(
-        "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
+        "worst", _worst, needs=("verification",), applies=_of_study(lambda study: study.worst_case),
         words={"worst": "worst case of the best designs"}, writes=("worst",),
         samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
-    Stage("chaos", _chaos, needs=("verification",), writes=("chaos",), samples=_of_chaos),
     Stage(
-        "responses", _responses, needs=("verification",),
+        "chaos", _chaos, needs=("verification",), writes=("chaos",),
+        samples=_samples("chaos", _of_study(lambda study: chaos.designs(study) * 2 * chaos.PAIRS)),
+    ),
+    Stage(
+        "responses", _responses, needs=("verification",), responses=_of_study(responses.simulations),
         words={"responses": "responses of the baseline and the best designs"},
-        responses=lambda scene: responses.simulations(scene.required_study) ,
     ),
     Stage(
         "readings", lambda run: readings.write(run, run.stage("readings", readings.evaluate)), applies=readings.applies,
-        words={"readings": "published designs under alternative interpretations"},
-        writes=("readings",), samples=_of_readings, responses=lambda scene: readings.simulations(scene)[1],
+        words={"readings": "published designs under alternative interpretations"}, writes=("readings",),
+        samples=_samples("readings", lambda scene: readings.simulations(scene)[0]),
+        responses=lambda scene: readings.simulations(scene)[1],
     ),
     Stage(
-        "claims", _claims, needs=("sensitivity", "surrogates", "responses"), applies=is_the_papers, writes=("claims",),
+        "claims",
+        lambda run, effects, models, series: claims.write(run, claims.judge(run, effects, models.kept, series)),
+        needs=("sensitivity", "surrogates", "responses"), applies=is_the_papers, writes=("claims",),
     ),
 )  # fmt: skip
 """In their order."""

@@ -96,10 +96,8 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     while arrays := _named(result, f"model{len(found)}_"):
         (model,) = models_in(arrays).values()
         if isinstance(method, RegressionMethod):
-            leaves = (
-                method.restored(leaf) for leaf in model.leaves if isinstance(leaf, Regression)
-            )
-            model = replace(model, leaves=tuple(leaves))
+            ours = (leaf for leaf in model.leaves if isinstance(leaf, Regression))
+            model = replace(model, leaves=tuple(map(method.restored, ours)))
         found.append(model)
     return found
 
@@ -118,25 +116,18 @@ def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
     values, responses = run.simulations.met()
     columns = [study.names.index(name) for name in names]
     loads = study.load_cases
-    rest = [
-        k
-        for k, name in enumerate(study.names)
-        if k not in columns and (loads is None or name != loads.name)
-    ]
+    apart = names if loads is None else (*names, loads.name)
+    rest = [k for k, name in enumerate(study.names) if name not in apart]
     here = values[:, rest] == np.array([run.scene.baseline(study.names[k]) for k in rest])
     points = to_coordinates(run.scene, names, values[:, columns])
     inside = (points >= model.lower) & (points <= model.upper)
     rows = here.all(axis=1) & inside.all(axis=1)
     unknown, accepted = np.full(1, np.nan), np.zeros(1, bool)
-    found = []
+    bounds, found = np.column_stack([model.lower, model.upper]), []
+    fitted = [coordinate(study.variable(name)) for name in names]
     for name, one in zip(study.further, responses[1:], strict=True):
-        leaf = method_of(run.scene).fit(
-            points[rows],
-            one[rows],
-            np.column_stack([model.lower, model.upper]),
-            rng=run.rng("kriging", name),
-            names=[coordinate(study.variable(n)) for n in names],
-        )
+        data, rng = (points[rows], one[rows], bounds), run.rng("kriging", name)
+        leaf = method_of(run.scene).fit(*data, rng=rng, names=fitted)
         found.append(Piecewise((leaf,), unknown, unknown, accepted))
     return found
 
@@ -163,14 +154,10 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     data |= {name: checks[:, column] for column, name in enumerate(_CHECKS)}
     data["family"] = np.array([families[k] for k, _ in leaves])
     names = [_label(models[k], families[k], leaf) for k, leaf in leaves]
-    coords = {
-        "model": np.array(names),
-        "point": np.arange(data["training_output"].shape[1]),
-        "parameter": np.array(parameters),
-    }
-    content = dataset.dataset(
-        "kriging", coords, data, None, _units(run), run.scene.objective, run.words
-    )
+    points = np.arange(data["training_output"].shape[1])
+    coords = {"model": np.array(names), "point": points, "parameter": np.array(parameters)}
+    about = None, _units(run), run.scene.objective, run.words
+    content = dataset.dataset("kriging", coords, data, *about)
     if leaves[0][1].label and "surrogate" in content:
         content.attrs["title"] = f"Surrogates of the objective, {leaves[0][1].label}"
     run.write(content)
@@ -182,9 +169,5 @@ def _label(model: Piecewise, family: str, leaf: Leaf) -> str:
 
 def _units(run: StudyRun) -> dict[str, str]:
     """Units of sampling coordinates, "1" for ratios."""
-    return {
-        coordinate(variable): "1"
-        if variable.ratio is not None or not variable.unit
-        else variable.unit
-        for variable in run.study.variables
-    }
+    every = {coordinate(one): one for one in run.study.variables}
+    return {n: (one.unit if one.ratio is None else "") or "1" for n, one in every.items()}

@@ -129,16 +129,11 @@ def _order_is_kept(found: SensitivityEvidence) -> Finding:
     unsure: list[str] = []
     for a, b in itertools.combinations(names, 2):
         rows = [k for k, inputs in enumerate(found.inputs) if a in inputs and b in inputs]
+        at = [found.names.index(a), found.names.index(b)]
         for row in rows:
-            pair = [
-                (
-                    found.result["best_sensitivity"][row, :, c],
-                    found.result["uncertainty"][row, :, c],
-                )
-                for c in (found.names.index(a), found.names.index(b))
-            ]
-            lead = abs(pair[0][0]) - abs(pair[1][0])
-            allowed = SURE * np.hypot(pair[0][1], pair[1][1])
+            one, other = abs(found.result["best_sensitivity"][row][:, at].T)
+            lead = one - other
+            allowed = SURE * np.hypot(*found.result["uncertainty"][row][:, at].T)
             first, second = lead > allowed, lead < -allowed
             where = changed if first.any() and second.any() else kept
             if not (first.all() or second.all() or where is changed):
@@ -155,10 +150,8 @@ def _size_varies(found: SensitivityEvidence) -> Finding:
     parts, texts = [], []
     for name in found.influential():
         effects, errors = found.of(name)
-        known = [
-            np.isfinite(e) & np.isfinite(s) & (s > 0) for e, s in zip(effects, errors, strict=True)
-        ]
-        row = int(np.argmax([k.sum() for k in known]))
+        known = np.isfinite(effects) & np.isfinite(errors) & (errors > 0)
+        row = int(known.sum(axis=1).argmax())
         effect, error = effects[row][known[row]], errors[row][known[row]]
         if len(effect) < 2:
             parts.append((False, False))
@@ -223,39 +216,26 @@ class ResponseEvidence:
             change, sure = self.change(a, b, statistic, quantity)
             supported.append(sign * change > sure)
             refuted.append(sign * change < -sure)
+            text = f"{100 * change:+.1f} % (significant above {100 * sure:.1f} %)"
             if np.isnan(change):
-                texts.append(
-                    f"{a} against {b}: {statistic} of {quantity} unknown, for it was not simulated or failed"
-                )
-            elif not supported[-1]:
-                texts.append(
-                    f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} % "
-                    f"(significant above {100 * sure:.1f} %)"
-                )
+                text = "unknown, for it was not simulated or failed"
+            if not supported[-1]:
+                texts.append(f"{a} against {b}: {statistic} of {quantity} {text}")
         text = f"{sum(supported)} of {len(wanted)} comparisons as claimed"
-        if texts:
-            text += "; not: " + "; ".join(texts)
-        return verdict(supported, refuted), text
+        return verdict(supported, refuted), text + (f"; not: {'; '.join(texts)}" if texts else "")
 
 
 def _reach(values: Array) -> float:
     """95 % half-width of a mean over copies and their segments, (copies, segments): Student's t of the copies where they
     disagree, of the segments where motion is regular and copies agree."""
-    reaches = [
-        student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))
-        for x in (values.mean(axis=1), values.mean(axis=0))
-    ]
-    return float(max(reaches))
+    means = (values.mean(axis=axis) for axis in (1, 0))
+    return float(max(student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x)) for x in means))
 
 
 def _peaks_cut(run: StudyRun, found: ResponseEvidence) -> Finding:
-    wanted = [
-        (name, "original", "peak", quantity, -1)
-        for name in found.names
-        if name != "original"
-        for quantity in QUANTITIES[:3]
-    ]
-    return found.judged(wanted)
+    names = [name for name in found.names if name != "original"]
+    pairs = itertools.product(names, QUANTITIES[:3])
+    return found.judged([(name, "original", "peak", quantity, -1) for name, quantity in pairs])
 
 
 def _alpha_lower_beta_calmer(run: StudyRun, found: ResponseEvidence) -> Finding:
@@ -272,11 +252,8 @@ def _case_2_cuts_more(run: StudyRun, found: ResponseEvidence) -> Finding:
     first, second = case_names(run.scene)
     if first is None or second is None:
         return OPEN, "the study has not both of the paper's cases"
-    wanted = [
-        (f"{second} {letter}", f"{first} {letter}", "peak", quantity, -1)
-        for letter in ("alpha", "beta")
-        for quantity in QUANTITIES
-    ]
+    pairs = itertools.product(("alpha", "beta"), QUANTITIES)
+    wanted = [(f"{second} {end}", f"{first} {end}", "peak", name, -1) for end, name in pairs]
     acceleration = (f"{second} alpha", f"{first} alpha", "peak", QUANTITIES[3])
     wanted[wanted.index((*acceleration, -1))] = (*acceleration, 1)
     return found.judged(wanted)
@@ -294,10 +271,8 @@ def _beta_of_case_2(run: StudyRun, found: ResponseEvidence) -> Finding:
 def _kriging_accurate(run: StudyRun, kriging: Result) -> Finding:
     checks = np.array([kriging[f"model{k}_check"] for k in range(len(run.study.models))])
     r2, rmse = checks[:, 0], checks[:, 4]
-    texts = [
-        f"{' '.join(names)}: R2 {one:.4f}, RMSE {error:.2g}"
-        for names, one, error in zip(run.study.models, r2, rmse, strict=True)
-    ]
+    rows = zip(run.study.models, r2, rmse, strict=True)
+    texts = [f"{' '.join(names)}: R2 {one:.4f}, RMSE {off:.2g}" for names, one, off in rows]
     passed = r2 >= run.study.surrogate.r2
     text = f"on fresh points, R2 of at least {run.study.surrogate.r2:g} required; "
     return verdict(passed, r2 < 0.9), text + "; ".join(texts)

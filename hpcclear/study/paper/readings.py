@@ -17,6 +17,7 @@ from hpcclear.base.outcome import JOINTS, Status
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.progress import Progress
+from hpcclear.report.figures.motion import eccentricity
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
@@ -49,14 +50,10 @@ class Interpretation:
     @property
     def text(self) -> str:
         """For people."""
-        return ", ".join(
-            (
-                f"c_e {self.restitution:g}",
-                f"eq. 4 {'with' if self.with_journal_radius else 'without'} R_J",
-                f"{'R_B' if self.bearing_fixed else 'R_J'} fixed",
-                "f over solver steps" if self.over_steps else "f over time",
-            )
-        )
+        stiffness = f"eq. 4 {'with' if self.with_journal_radius else 'without'} R_J"
+        fixed = f"{'R_B' if self.bearing_fixed else 'R_J'} fixed"
+        over = "f over solver steps" if self.over_steps else "f over time"
+        return f"c_e {self.restitution:g}, {stiffness}, {fixed}, {over}"
 
 
 def applies(scene: Scene) -> bool:
@@ -91,11 +88,8 @@ def readings(scene: Scene) -> list[Interpretation]:
 def evaluate(run: StudyRun) -> Result:
     """Mean, standard deviation and f at the smallest clearance for each reading and printed design: the data variables of
     readings.nc, (readings, designs)."""
-    rows = [
-        run.part(f"{STAGE}-{k}", _row, reading)["row"]
-        for k, reading in enumerate(readings(run.scene))
-    ]
-    table = np.array(rows)
+    every = enumerate(readings(run.scene))
+    table = np.array([run.part(f"{STAGE}-{k}", _row, reading)["row"] for k, reading in every])
     result = {name: table[..., k] for k, name in enumerate((*_COLUMNS, "objective_smallest"))}
     result["failed"] = result["failed"].astype(np.int64)
     return result
@@ -127,51 +121,29 @@ def _over_time(
 ) -> list[tuple[float, ...]]:
     """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
     length = scrambled_length(run.study.verification.audit_samples)
-    batches = [
-        batch for one in designs for batch in (scattered(run, one, length), _smallest(run, one))
-    ]
-    points = Points(
-        batches[0].names, np.vstack([batch.values for batch in batches]), batches[0].paths
-    )
-    records = sample_points(
-        _scene(run, reading),
-        _read(run, reading, points),
-        run.ranks,
-        None,
-        Progress("", style="quiet"),
-        stage=f"{STAGE}: simulations",
-    )
+    batches = [batch for d in designs for batch in (scattered(run, d, length), _smallest(run, d))]
+    values = np.vstack([batch.values for batch in batches])
+    points = _read(run, reading, Points(batches[0].names, values, batches[0].paths))
+    where = run.ranks, None, Progress("", style="quiet")
+    records = sample_points(_scene(run, reading), points, *where, stage=f"{STAGE}: simulations")
     f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
-    return [
-        (*_moments(part[:-1].reshape(REPLICATES, length)), float(part[-1]))
-        for part in f.reshape(len(designs), -1)
-    ]
+    parts = f.reshape(len(designs), -1)
+    return [(*_moments(one[:-1].reshape(REPLICATES, length)), float(one[-1])) for one in parts]
 
 
 def _over_steps(
     run: StudyRun, reading: Interpretation, designs: Sequence[Choice]
 ) -> list[tuple[float, ...]]:
     """The same, a response each."""
-    rows = [
-        (batch.names, row)
-        for one in designs
-        for batch in (samples_of(run, one, STEP_SAMPLES), _smallest(run, one))
-        for row in batch.values
-    ]
     variants: list[dict[str, object]] = []
-    for names, row in rows:
-        variants.append({"output.instants_per_revolution": 0})
-        for name, value in zip(names, row, strict=True):
-            variants[-1] |= dict.fromkeys(run.study.variable(name).paths, float(value))
-    f = responses_of(
-        _scene(run, reading),
-        variants,
-        _mean_over_steps,
-        (),
-        run.ranks,
-        f"{STAGE}: simulations",
-        together=TOGETHER,
-    )
+    for one in designs:
+        for batch in (samples_of(run, one, STEP_SAMPLES), _smallest(run, one)):
+            for row in batch.values:
+                variants.append({"output.instants_per_revolution": 0})
+                for name, value in zip(batch.names, row, strict=True):
+                    variants[-1] |= dict.fromkeys(run.study.variable(name).paths, float(value))
+    what = _scene(run, reading), variants, _mean_over_steps, (), run.ranks
+    f = responses_of(*what, f"{STAGE}: simulations", together=TOGETHER)
     parts = f.reshape(len(designs), -1)
     return [(*_moments(part[:-1, None]), float(part[-1])) for part in parts]
 
@@ -189,9 +161,7 @@ def _mean_over_steps(scene: Scene, response: Results) -> Array:
         return np.array(np.nan)
     turn = 2.0 * np.pi * scene.numerics.transient_revolutions
     steady = response["crank_angle"].values >= turn
-    distance = np.hypot(response["eccentricity_x"].values, response["eccentricity_y"].values)[
-        steady
-    ]
+    distance = eccentricity(response)[steady]
     clearance = [scene.number(f"joints.{joint}.clearance") for joint in JOINTS]
     return np.array(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
 
