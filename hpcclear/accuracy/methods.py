@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,16 +53,9 @@ class Integrator:
 
 def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Scene:
     """The scene for one revolution from the start, all of it averaged."""
-    changes: dict[str, object] = {
-        "transient_revolutions": 0,
-        "averaged_revolutions": 1,
-        "target_error": None,
-        "atol": None,
-        "energy": False,
-        **numerics,
-    }
-    if rtol is not None:
-        changes["rtol"] = rtol
+    changes: dict[str, object] = {"transient_revolutions": 0, "averaged_revolutions": 1}
+    changes |= {"target_error": None, "atol": None, "energy": False, **numerics}
+    changes |= {} if rtol is None else {"rtol": rtol}
     return scene.with_({f"numerics.{key}": value for key, value in changes.items()})
 
 
@@ -116,10 +110,8 @@ def outside_method(scene: Scene, designs: int, name: str) -> Integrator:
     made = systems(scene, designs)
 
     def run(rtol: float) -> TurnOutcome:
-        pairs = [solve_turn(scene, one, name, rtol) for one in made]
-        return TurnOutcome(
-            np.array([values for values, _ in pairs]), np.array([n for _, n in pairs])
-        )
+        values, counts = zip(*(solve_turn(scene, one, name, rtol) for one in made), strict=True)
+        return TurnOutcome(np.array(values), np.array(counts))
 
     def prepare(rtol: float) -> tuple[Run, float]:
         made[0](0.0, made[0].start)
@@ -166,9 +158,8 @@ def solve_turn(
         hit = [k for k, when in enumerate(piece.t_events) if len(when)]
         if piece.status < 0:
             return (np.nan,) * 4, count
-        if (
-            piece.status == 0 or len(joints) in hit
-        ):  # the event after those of the joints: a full turn
+        turned = len(joints) in hit  # the event after those of the joints
+        if piece.status == 0 or turned:
             return _values(scene, one, y, t, peak), count
         for j in (joints[k] for k in hit):
             side[j] = -side[j]
@@ -209,20 +200,19 @@ def _event(value: Event, direction: float) -> Event:
 def _largest_force(one: CalledEquations, piece: object) -> float:
     """Largest contact force of a piece, by its dense output about the largest step end."""
     times, states, dense = piece.t, piece.y.T, piece.sol  # type: ignore[attr-defined]
-    forces = np.array(
-        [one.joints(t, y)[:, FORCE].copy() for t, y in zip(times, states, strict=True)]
-    )
+    instants = zip(times, states, strict=True)
+    forces = np.array([one.joints(t, y)[:, FORCE].copy() for t, y in instants])
     largest = float(forces.max())
     row, joint = np.unravel_index(forces.argmax(), forces.shape)
     low, high = times[max(row - 1, 0)], times[min(row + 1, len(times) - 1)]
     if largest == 0.0 or not low < high:
         return largest
-    found = minimize_scalar(
-        lambda t: -one.joints(t, dense(t))[joint, FORCE],
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 1e-6 * (high - low)},
-    )
+
+    def negative(t: float) -> float:
+        return -float(one.joints(t, dense(t))[joint, FORCE])
+
+    near = {"xatol": 1e-6 * (high - low)}
+    found = minimize_scalar(negative, bounds=(low, high), method="bounded", options=near)
     return max(largest, -float(found.fun))
 
 
@@ -241,11 +231,9 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Integrator]:
         wanted += [("radau", 1, "minimal", "radau"), ("baumgarte", 1, "baumgarte", "tsitouras")]
     found = []
     for name, width, formulation, method in wanted:
-        numerics = {"formulation": formulation, "method": method}
-        try:
-            found.append(kernel_method(name, scene, designs, width, **numerics))
-        except InputError:
-            continue  # not for this scene
+        how = {"formulation": formulation, "method": method}
+        with suppress(InputError):  # not for this scene
+            found.append(kernel_method(name, scene, designs, width, **how))
     return found + [outside_method(scene, designs, name) for name in ("DOP853", "LSODA")]
 
 

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from hpcclear.accuracy import averaging, integration, parallel, random_inputs, spending, surrogate
+from hpcclear.accuracy import parallel, random_inputs, spending, surrogate
 from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.arrays import Array
@@ -38,17 +38,11 @@ class Panels:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        ranks: Ranks,
-        profile: Profile,
-        notify: Notify,
-        store: Checkpoint | None,
+        self, scene: Scene, ranks: Ranks, profile: Profile, notify: Notify, store: Checkpoint | None,
         show: Callable[[Results], object],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.scene, self.ranks, self.profile = scene, ranks, profile
-        self._store, self._show = store, show
-        self._listener = notify
+        self._store, self._show, self._listener = store, show, notify
         self.values: Variables = {}
         self.attributes: dict[str, object] = {
             **scene.origin,
@@ -87,24 +81,17 @@ class Panels:
         self.values.update(self.kept(name, work))
         self._show(self.content(whole=False))
 
+    def timed_panel(self, name: str, work: Callable[[], Variables]) -> None:
+        """The same of work that is no stage by itself."""
+        with self.ranks.stage(name):
+            self.panel(name, work)
+
     def content(self, *, whole: bool = True) -> Results:
         """Kind ``accuracy``, of all that is there."""
         known = KINDS["accuracy"].coords
         coords = {name: value for name, value in self.values.items() if name in known}
         data = {name: value for name, value in self.values.items() if name not in known}
         return dataset.dataset("accuracy", coords, data, self.attributes, whole=whole)
-
-    def add_integration(self) -> None:
-        """Error of one revolution against time, for every method."""
-        with self.ranks.stage("integration"):
-            self.panel(
-                "integration", lambda: integration.measure(self.scene, self.profile, self.notify)
-            )
-
-    def add_averaging(self) -> None:
-        """Error of f against revolutions."""
-        with self.ranks.stage("averaging"):
-            self.panel("averaging", lambda: averaging.measure(self.scene, self.profile))
 
     def add_motion(self) -> None:
         """What kind of motion it is, as an attribute."""
@@ -136,7 +123,7 @@ class Panels:
                 self._shown(longer)
 
     def _shown(self, run: spending.Run) -> None:
-        self.values.update(_spending(spending.analyse(run)))
+        self.values.update(spending.analyse(run).variables)
         self._show(self.content(whole=False))
 
     def add_study(self) -> None:
@@ -168,29 +155,5 @@ class Panels:
 
         self.panel("random-inputs", moments)
         self.panel("ranks", lambda: parallel.measure(studied, case, seconds, profile, ranks))
-        self.attributes["batch"] = (
-            f"ranks: {parallel.samples_of(seconds, profile)} samples, or as many a rank"
-        )
-
-
-# ---- what is found, as the file has it ---------------------------------------------------------
-
-
-def _spending(found: spending.Spending) -> Variables:
-    cheapest = np.array([found.cheapest(aim) for aim in spending.AIMS])
-    return {
-        "tolerance": found.tolerance,
-        "spent": found.spent,
-        "aim": np.array(spending.AIMS),
-        "spent_error": found.error,
-        "spent_model": found.model,
-        "spent_seconds": found.seconds,
-        "tolerance_bias": found.bias,
-        "tolerance_bias_error": found.bias_error,
-        "turn_variance": found.variance,
-        "tolerance_seconds": found.turn_seconds,
-        "spin_up": np.array(found.spin_up),
-        "cheapest_tolerance": cheapest[:, 0],
-        "cheapest_revolutions": cheapest[:, 1],
-        "cheapest_seconds": cheapest[:, 2],
-    }
+        count = parallel.samples_of(seconds, profile)
+        self.attributes["batch"] = f"ranks: {count} samples, or as many a rank"

@@ -115,23 +115,17 @@ class Plan:
 
     def wall_seconds(self, row: Row, simulations: int, ranks: int) -> float:
         """Wall time of a job."""
-        return (
-            simulations * row.seconds / (ranks * (EFFICIENCY if ranks > 1 else 1.0)) + self.startup
-        )
+        used = ranks * EFFICIENCY if ranks > 1 else 1.0
+        return simulations * row.seconds / used + self.startup
 
     def _repr_html_(self) -> str:
         """What a notebook shows: each error with its settings and cost, on as many ranks as were planned for."""
-        count = self.simulations
-        rows = [
-            (
-                "as in the scene" if row.error is None else f"{row.error:g}",
-                row.settings(),
-                f"{1e3 * row.seconds:.3g}",
-                duration(self.core_seconds(row, count, self.workers)),
-                duration(self.wall_seconds(row, count, self.workers)),
-            )
-            for row in self.rows
-        ]
+        count, rows = self.simulations, []
+        for row in self.rows:
+            error = "as in the scene" if row.error is None else f"{row.error:g}"
+            spent = (self.core_seconds, self.wall_seconds)
+            times = (duration(one(row, count, self.workers)) for one in spent)
+            rows.append((error, row.settings(), f"{1e3 * row.seconds:.3g}", *times))
         header = ("target error", "settings", "ms per sample", "core time", "wall time")
         title = f"{count} simulations on {self.workers} rank{'s' if self.workers > 1 else ''}"
         return markup.table(title, rows, header)
@@ -177,10 +171,8 @@ def measure(
         return Plan(tuple(rows), study.samples, whole, startup, peak, columns, single, workers)
 
     if not np.isfinite([host.peak_memory(), process_age_at_start()]).all():
-        notify(
-            f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
-            f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
-        )
+        usual = f"{USUAL_STARTUP:g} s and {USUAL_MEMORY / 2**20:g} MB a rank are assumed"
+        notify(f"start-up and memory are not measured on this system; {usual}")
     seconds, first = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
     rows.append(Row(None, scene, seconds, "", _spread(first)))
     if study.cases:
@@ -190,10 +182,9 @@ def measure(
     rows.clear()
     with _company(scene, points, workers if ranks.size == 1 else 1, notify):
         for k, (error, one) in enumerate(wanted):
-            limit = FILE_SECONDS if error is None else LEVEL_SECONDS
-            setting = (
-                "the settings of the file" if error is None else f"a target error of {error:g}"
-            )
+            limit, setting = FILE_SECONDS, "the settings of the file"
+            if error is not None:
+                limit, setting = LEVEL_SECONDS, f"a target error of {error:g}"
             notify(f"measuring {k + 1} of {len(wanted)}: {setting}")
             seconds, records = cost(one, points, ranks, limit, str(k), progress_style)
             rows.append(Row(error, one, seconds, wording.in_short(one, records), _spread(records)))
@@ -251,20 +242,14 @@ def _company(
     others = max(min(workers, len(host.cores())) - 1, 0)
     content = {k: v for k, v in scene.resolved().items() if k != "study"}
     if others:
-        notify(
-            f"starting {others} more processes, to measure on cores that are as busy as those of the job"
-        )
+        why = "to measure on cores that are as busy as those of the job"
+        notify(f"starting {others} more processes, {why}")
     with tempfile.NamedTemporaryFile() as work, ExitStack() as stack:
         work.write(pickle.dumps((content, points)))
         work.flush()
         words = isolated.python("hpcclear.accuracy.plan:keep_busy", work.name)
-        started = [
-            stack.enter_context(
-                subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-            )
-            for _ in range(others)
-        ]
-        for process in started:
+        start = partial(subprocess.Popen, words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        for process in [stack.enter_context(start()) for _ in range(others)]:
             if process.stdout is not None:
                 process.stdout.readline()  # it has begun, or has ended
         yield
@@ -275,9 +260,8 @@ def keep_busy(work: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the process that started this one
     content, points = pickle.loads(Path(work).read_bytes())
     threading.Thread(target=_end_with_input, daemon=True).start()
-    evaluator = Evaluator(
-        load_scene(content, trust=True).with_({"numerics.target_error": None}), points
-    )
+    scene = load_scene(content, trust=True).with_({"numerics.target_error": None})
+    evaluator = Evaluator(scene, points)
     evaluator.advance(0.0)
     sys.stdout.write("busy\n")
     sys.stdout.flush()

@@ -31,10 +31,8 @@ def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[A
     """
     names, middle = middle_of(scene, case)
     chosen = dict(zip(names, middle[0], strict=True))
-    random = scene.required_study.case(case).random
-    points = monte_carlo(
-        scene, profile.simulations, random=random, design=chosen, purpose="accuracy"
-    )
+    random, count = scene.required_study.case(case).random, profile.simulations
+    points = monte_carlo(scene, count, random=random, design=chosen, purpose="accuracy")
     values, each = objectives(scene, points, ranks, "random inputs: simulations")
     return values[np.isfinite(values)], each
 
@@ -71,9 +69,8 @@ def measure(
     rng = generator(scene.required_study.seed, "accuracy", "draws")
     for k, size in enumerate(sizes):
         started = time.perf_counter()
-        found = [
-            problem.objective.monte_carlo(design, int(size), rng) for _ in range(profile.blocks)
-        ]
+        drawn = problem.objective.monte_carlo
+        found = [drawn(design, int(size), rng) for _ in range(profile.blocks)]
         seconds[0, k] = (time.perf_counter() - started) / profile.blocks
         table = np.array([[one.mean[0], one.deviation[0]] for one in found])
         error[0, :, k], lower[0, :, k], upper[0, :, k] = root_mean_square(table / exact - 1.0, 0)
@@ -85,9 +82,8 @@ def measure(
         if blocks >= LEAST_BLOCKS:
             parts = values[: blocks * size].reshape(blocks, size)
             table = np.stack([parts.mean(axis=1), parts.std(axis=1, ddof=1)], axis=1)
-            error[1, :, k], lower[1, :, k], upper[1, :, k] = root_mean_square(
-                table / truth - 1.0, 1
-            )
+            ends = root_mean_square(table / truth - 1.0, 1)
+            error[1, :, k], lower[1, :, k], upper[1, :, k] = ends
     bias_error = np.array([true.mean_error[0], true.deviation_error[0]]) / truth
     return {
         "estimate": np.array(ESTIMATES),

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from hpcclear.accuracy import surrogate
+from hpcclear.accuracy import averaging, integration, surrogate
 from hpcclear.accuracy.panels import Notify, Panels
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
@@ -34,23 +34,23 @@ def measure(
     settings.
     """
     if scene.objective.joints:
-        raise InputError(
-            "numerics.objective_joints", scene.numerics.objective_joints,
+        key, joints = "numerics.objective_joints", scene.numerics.objective_joints
+        reason, remedy = (
             "accuracy is measured for all joints together",
             "Leave the joints out for this command",
-        )  # fmt: skip
-    if not scene.clearance_joints():
-        raise InputError(
-            "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"
         )
+        raise InputError(key, joints, reason, remedy)
+    if not scene.clearance_joints():
+        reason = "the objective is 0 without clearance"
+        raise InputError("joints", "ideal", reason, "Give a joint clearance")
     panels = Panels(scene, ranks, profile, notify, store, show)
     notify("compilation")
     studied, case, _ = with_case(scene)
     surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
     panels.add_motion()
     panels.add_spending()
-    panels.add_integration()
-    panels.add_averaging()
+    panels.timed_panel("integration", lambda: integration.measure(scene, profile, panels.notify))
+    panels.timed_panel("averaging", lambda: averaging.measure(scene, profile))
     panels.add_study()
     return panels.content()
 

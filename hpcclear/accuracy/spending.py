@@ -15,6 +15,7 @@ import numpy as np
 
 from hpcclear.accuracy.averaging import doubling
 from hpcclear.accuracy.methods import one_turn
+from hpcclear.accuracy.profile import Variables
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
@@ -73,6 +74,26 @@ class Spending:
         """What a mean costs, its spin-up included, shape (r, n)."""
         return self.turn_seconds[:, None] * (self.spent[None, :] + COPIES * self.spin_up)
 
+    @property
+    def variables(self) -> Variables:
+        """The panel as the file has it."""
+        cheapest = np.array([self.cheapest(aim) for aim in AIMS]).T
+        names = ("cheapest_tolerance", "cheapest_revolutions", "cheapest_seconds")
+        return {
+            "tolerance": self.tolerance,
+            "spent": self.spent,
+            "aim": np.array(AIMS),
+            "spent_error": self.error,
+            "spent_model": self.model,
+            "spent_seconds": self.seconds,
+            "tolerance_bias": self.bias,
+            "tolerance_bias_error": self.bias_error,
+            "turn_variance": self.variance,
+            "tolerance_seconds": self.turn_seconds,
+            "spin_up": np.array(self.spin_up),
+            **dict(zip(names, cheapest, strict=True)),
+        }
+
     def cheapest(self, aim: float) -> tuple[float, float, float]:
         """Tolerance, revolutions and seconds that reach a standard error at the least cost by the formula.
 
@@ -105,12 +126,11 @@ class Run:
         """Nothing simulated yet: every copy of every tolerance has a perturbation of its own."""
         here = one_turn(scene)
         first, scale = start_states(here, parameters(here)), scales(here)
-        starts = [
-            perturbed(first, scale, range(1 + k * COPIES, 1 + (k + 1) * COPIES)).rows
-            for k in range(len(TOLERANCES))
-        ]
-        nothing = np.empty((0, len(TOLERANCES), COPIES, MAX_JOINTS))
-        return cls(nothing, np.zeros(len(TOLERANCES)), np.stack(starts))
+        count = len(TOLERANCES)
+        numbers = (range(k, k + COPIES) for k in range(1, count * COPIES, COPIES))
+        starts = [perturbed(first, scale, own).rows for own in numbers]
+        nothing = np.empty((0, count, COPIES, MAX_JOINTS))
+        return cls(nothing, np.zeros(count), np.stack(starts))
 
 
 def measure(
@@ -141,9 +161,8 @@ def measure(
 
 def _lanes(scene: Scene, rtol: float) -> Lanes:
     changes = {"rtol": rtol, "atol": None, "averaged_revolutions": SEGMENT}
-    lanes = Lanes(
-        problem_of(scene.with_({f"numerics.{k}": v for k, v in changes.items()})), DEFAULT_LANES
-    )
+    here = scene.with_({f"numerics.{name}": value for name, value in changes.items()})
+    lanes = Lanes(problem_of(here), DEFAULT_LANES)
     lanes.step(1)  # without samples it only compiles
     return lanes
 
@@ -154,9 +173,7 @@ def analyse(run: Run) -> Spending:
     spin_up = int(np.median([_spin_up(gaps) for gaps in kept]))
     kept = [gaps[spin_up:] for gaps in kept]
     means = [objective(gaps.mean(axis=0)) for gaps in kept]  # (copies,) each
-    mean, square = (
-        np.array([function(one) for one in means]) for function in (np.mean, _square_error)
-    )
+    mean, square = (np.array([*map(function, means)]) for function in (np.mean, _square_error))
     truth, pool = _truth(mean, square)
     share = np.zeros(len(mean))
     share[pool:] = 1.0 / (len(mean) - pool)

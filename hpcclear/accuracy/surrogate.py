@@ -38,8 +38,9 @@ def designs_of(scene: Scene, case: str, profile: Profile, rng: np.random.Generat
 
 def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
     """The objective at all designs, one after the other, shape (n,), and core-seconds of one of them."""
-    coordinates = designs_of(scene, case, profile, _generator(scene))
-    return simulated(scene, region_of(scene, case), np.concatenate(coordinates), ranks)
+    coordinates = np.concatenate(designs_of(scene, case, profile, _generator(scene)))
+    points = points_at(scene, region_of(scene, case).names, coordinates)
+    return objectives(scene, points, ranks, "surrogate: simulations")
 
 
 def _generator(scene: Scene) -> np.random.Generator:
@@ -96,22 +97,8 @@ def measure(
 def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
     """Simulate one design on the available ranks: every rank compiles the kernel, or loads it."""
     region = region_of(scene, case)
-    middle = 0.5 * (region.lower + region.upper)[None]
-    simulated(scene, region, middle, ranks, "compilation")
-
-
-def simulated(
-    scene: Scene,
-    region: Box,
-    coordinates: Array,
-    ranks: Ranks,
-    stage: str = "surrogate: simulations",
-) -> tuple[Array, float]:
-    """The study's objective, shape (n,), SI, NaN where failed, at points in sampling coordinates, shape (n, d).
-
-    With the core-seconds of one of them.
-    """
-    return objectives(scene, points_at(scene, region.names, coordinates), ranks, stage)
+    middle = points_at(scene, region.names, 0.5 * (region.lower + region.upper)[None])
+    objectives(scene, middle, ranks, "compilation")
 
 
 def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:

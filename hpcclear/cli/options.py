@@ -152,12 +152,7 @@ GROUPS = {"start": "Start", "compute": "Compute", "look": "Look at results", "ke
 class Command(click.Command):
     """A command: options that belong together reach it as one argument.
 
-    Attributes
-    ----------
-    group : str
-        One of `GROUPS`.
-    ranks : bool
-        Whether all ranks carry it out; otherwise only root does, and the others leave at once.
+    `group`: one of `GROUPS`; `ranks`: whether all ranks carry it out; otherwise only root does, and the others leave at once.
     """
 
     group = ""

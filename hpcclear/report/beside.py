@@ -23,18 +23,10 @@ class Role(NamedTuple):
 
 
 def roles(verified: Results) -> dict[str, list[Role]]:
-    """Return the designs to compare, by case, each distinct design once.
+    """Return the designs to compare (of kind ``verification``), by case, each distinct design once.
 
-    Parameters
-    ----------
-    verified : xarray.Dataset
-        Kind ``verification``.
-
-    Returns
-    -------
-    dict of str to list of Role
-        Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses, unless one
-        of these is as light. Intermediate designs of the search are left out.
+    Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses, unless one of
+    these is as light. Intermediate designs of the search are left out.
     """
     names = texts_in(verified, "design")
     best = recommended(verified)

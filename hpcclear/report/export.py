@@ -33,29 +33,12 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
 def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "DataFrame":
-    """Write a result file as a table: a row a design or an instant, in the format that the name of `output` ends in.
+    """Write a result file as a table: a row a design or an instant, in the format that the name of `output` ends in (``.csv``,
+    ``.xlsx``, ``.mat`` or ``.parquet``). A file there is replaced if hpcclear wrote it.
 
-    Parameters
-    ----------
-    path : path
-        Result file of any command.
-    output : path
-        Ends in ``.csv``, ``.xlsx``, ``.mat`` or ``.parquet``. A file there is replaced if hpcclear wrote it.
-    units : sequence of str
-        As `to_table`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        What was written, as `to_table` makes it.
-
-    Raises
-    ------
-    InputError
-        The result cannot be read, the format is not known or needs a package that is not installed, or another
-        file is in the way.
-    StorageError
-        The disk is full or fails.
+    `units`: as of `to_table`. Returns what was written, as `to_table` makes it. Raises InputError if the result cannot be read,
+    the format is not known or needs a package that is not installed, or another file is in the way; StorageError if the disk is
+    full or fails.
     """
     place = Path(output)
     check_format(place)
@@ -84,23 +67,11 @@ def read_samples(paths: Sequence[str | Path]) -> dict[str, Results]:
 def statistics(
     every: Mapping[str, Results], output: str | Path, lines: spread.Lines, units: Sequence[str] = ()
 ) -> "DataFrame":
-    """Write the statistics of several samples: a row for each, and for each file columns of value and interval, as numbers.
+    """Write the statistics of several samples (of `read_samples`): a row for each, and for each file columns of value and
+    interval, as numbers.
 
-    Parameters
-    ----------
-    every : mapping of str to xarray.Dataset
-        As `read_samples`.
-    output : path
-        As `export`.
-    lines : mapping
-        As `hpcclear.report.spread.side_by_side` of these.
-    units : sequence of str
-        As `hpcclear.report.tables.to_table`.
-
-    Raises
-    ------
-    InputError
-        As `export`.
+    `output`: as of `export`; `lines`: as `hpcclear.report.spread.side_by_side` of these; `units`: as of `to_table`. Raises
+    InputError as `export`.
     """
     from pandas import DataFrame
 

@@ -68,20 +68,7 @@ class SheetContent(NamedTuple):
 def write_sheet(*places: str | Path, output: str | Path | None = None) -> Path:
     """Write a sheet (sheet.pdf) from result files; equal files of one day give equal bytes.
 
-    Parameters
-    ----------
-    *places, output : path
-        As of `hpcclear.report.html.page.write_report`; the output ends in ``.pdf``, ``.svg`` or ``.png``.
-
-    Returns
-    -------
-    Path
-        The sheet.
-
-    Raises
-    ------
-    InputError, StorageError
-        As for the page.
+    Arguments and errors as of `hpcclear.report.html.page.write_report`; the output ends in ``.pdf``, ``.svg`` or ``.png``.
     """
     style.matplotlib()
     content, troubles = read(*places), list[str]()

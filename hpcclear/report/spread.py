@@ -75,17 +75,8 @@ class Beyond(NamedTuple):
 def beyond(units: Mapping[str, str], words: str, joints: Sequence[str] = ()) -> Beyond:
     """Return the threshold that a user writes as ``"3 kN"`` (of f) or ``"peak_contact_force crank_rod=3 kN"``.
 
-    Parameters
-    ----------
-    units : mapping of str to str
-        SI unit of each result, by its name.
-    joints : sequence of str
-        Joints that may follow the name, as in the headings of tables.
-
-    Raises
-    ------
-    InputError
-        There is no such result or joint, or the value has another unit or none.
+    `units`: SI unit of each result, by its name; `joints`: those that may follow the name, as in the headings of tables. Raises
+    InputError: there is no such result or joint, or the value has another unit or none.
     """
     heading, equals, text = (part.strip().strip("\"'") for part in words.rpartition("="))
     name, _, joint = (heading if equals else "objective").partition(" ")
@@ -125,17 +116,11 @@ def units_of(objective: Objective) -> dict[str, str]:
 
 
 def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line]:
-    """Return mean, standard deviation and quantiles of f, the 95th percentile of each peak force, and shares beyond thresholds.
+    """Return mean, standard deviation and quantiles of f, the 95th percentile of each peak force, and shares beyond thresholds,
+    of samples (kind ``samples``); none where fewer than two succeeded.
 
-    Parameters
-    ----------
-    samples : xarray.Dataset
-        Kind ``samples``. Failed ones are left out of moments; the intervals of quantiles and shares hold whatever these were.
-
-    Returns
-    -------
-    list of Line
-        Empty where fewer than two samples succeeded. Without the attribute ``sampling`` there are no intervals.
+    Failed samples are left out of moments; the intervals of quantiles and shares hold whatever these were. Without the
+    attribute ``sampling`` there are no intervals.
     """
     method = str(samples.attrs.get("sampling", ""))
     f = _values(samples, "objective")

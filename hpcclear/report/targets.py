@@ -34,17 +34,10 @@ class Way(NamedTuple):
 
 
 def ways(found: Results) -> list[Way]:
-    """Return every measured pair of tolerance and revolutions whose bias is known well enough, the cheapest first.
+    """Return every measured pair of tolerance and revolutions whose bias is known well enough (kind ``accuracy``, with its
+    panel of tolerance and revolutions at least), the cheapest first.
 
-    Parameters
-    ----------
-    found : xarray.Dataset
-        Kind ``accuracy``, with its panel of tolerance and revolutions at least.
-
-    Returns
-    -------
-    list of Way
-        Means over `REPLICAS` replicas, by their formula; single runs too, where the panel of averaging is there.
+    Means over `REPLICAS` replicas, by their formula; single runs too, where the panel of averaging is there.
     """
     bias = _largest_bias(found)
     made = [way for k in range(len(bias)) for way in _ways_of(found, k, float(bias[k]))]

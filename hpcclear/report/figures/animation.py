@@ -27,25 +27,11 @@ _DPI = 150
 def animate(
     response: Results, path: str | Path, seconds: float = 6.0, revolutions: int = 2
 ) -> Path:
-    """Write a film of the last revolutions, slowed down or sped up to a length in seconds.
+    """Write a film of the last revolutions of a response (kind ``response``; fewer if it has fewer), slowed down or sped up to
+    a length in seconds.
 
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    path : path
-        Ends in ``.gif``, or in ``.mp4`` where the program ffmpeg is installed.
-    seconds : float
-        Length of the film.
-    revolutions : int
-        How many revolutions; fewer if the response has fewer.
-
-    Raises
-    ------
-    InputError
-        Another ending, no ffmpeg, no length, or another file in the way.
-    StorageError
-        The disk is full or fails.
+    `path`: ends in ``.gif``, or in ``.mp4`` where the program ffmpeg is installed. Raises InputError: another ending, no
+    ffmpeg, no length, or another file in the way. Raises StorageError: the disk is full or fails.
     """
     place = Path(path)
     if place.suffix.lower() not in (".gif", ".mp4"):

@@ -11,15 +11,8 @@ from hpcclear.results.content import Results
 def drawings(
     files: Files, responses: Mapping[str, Results]
 ) -> "dict[str, Callable[[], style.Figure]]":
-    """Return what draws each figure that results allow, by its name.
-
-    Parameters
-    ----------
-    files : mapping of str to xarray.Dataset
-        Files by their kinds, without responses.
-    responses : mapping of str to xarray.Dataset
-        By the names of designs; figures show several beside each other.
-    """
+    """Return what draws each figure that results allow, by its name: of files by their kinds, and of responses by the names of
+    designs, several of which figures show beside each other."""
     made = {one.name: one.of(files) for one in declared(FigureOf) if one.kind in files}
     if responses:
         first = next(iter(responses.values()))

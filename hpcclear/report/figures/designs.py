@@ -15,18 +15,12 @@ from hpcclear.results.content import Results, each, text_in, texts_in
 
 @style.drawn
 def front_figure(front: Results, verification: Results | None = None) -> "style.Figure":
-    """Pareto fronts of all cases, and the designs that were simulated (the paper's Fig. 9).
+    """Pareto fronts of all cases (kind ``front``), and the designs that were simulated (the paper's Fig. 9; kind
+    ``verification``), with confidence intervals, joined to what the surrogate said.
 
-    Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things
-    each two have panels of their own. Left the fronts alone, right with the baseline design and the paper's designs, which
-    lie far off.
-
-    Parameters
-    ----------
-    front : xarray.Dataset
-        Kind ``front``.
-    verification : xarray.Dataset, optional
-        Kind ``verification``: its designs are drawn with confidence intervals, joined to what the surrogate said.
+    Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things each
+    two have panels of their own. Left the fronts alone, right with the baseline design and the paper's designs, which lie far
+    off.
     """
     cases = texts_in(front, "case")
     asked = {case: _goals(front.sel(case=case)) for case in cases}

@@ -104,11 +104,9 @@ def _line(cells: Results, name: str) -> "style.Figure":
 
 @style.drawn
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
-    """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``).
-
-    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError
-    where the dataset is no bifurcation.
-    """
+    """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``). A motion that repeats
+    every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError where the dataset is no
+    bifurcation."""
     variables = labels.design_variables(bifurcation)
     if not variables or bifurcation.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"

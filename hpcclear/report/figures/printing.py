@@ -60,23 +60,10 @@ def printing(
 ) -> Iterator[None]:
     """Draw figures within it as a journal or a talk wants them; they can be saved within it or later.
 
-    Parameters
-    ----------
-    size : str
-        Width, ``"85mm"``, or width and height, ``"85mm x 60mm"``.
-    font : str
-        Name of an installed font.
-    sheet : path, optional
-        Style sheet of matplotlib; `size`, `font` and `theme` go before it.
-    theme : str
-        ``"light"`` or ``"dark"``.
-    texts : mapping of str to str, optional
-        What to write for a label, by the entry of the scene that it shows, the variable, or its words without the unit.
-
-    Raises
-    ------
-    InputError
-        No such size, font or style sheet; or no figure that was drawn has a label of that name.
+    `size`: width, ``"85mm"``, or width and height, ``"85mm x 60mm"``; `font`: name of an installed font; `sheet`: style sheet
+    of matplotlib, before which `size`, `font` and `theme`, ``"light"`` or ``"dark"``, go; `texts`: what to write for a label,
+    by the entry of the scene that it shows, the variable, or its words without the unit. Raises InputError: no such size, font,
+    theme or style sheet; or no figure that was drawn has a label of that name.
     """
     rc: dict[str, Any] = {} if sheet is None else _sheet(Path(sheet))
     if theme not in colours.THEMES:

@@ -317,24 +317,11 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
 
 
 def save(figure: "Figure", path: str | Path) -> Path:
-    """Write a figure whole, in the format its suffix names.
+    """Write a figure whole, in the format that the suffix of its path names: ``.png``, ``.svg`` or ``.pdf``. Returns where it
+    stands.
 
-    Parameters
-    ----------
-    path : path
-        Ends in ``.png``, ``.svg`` or ``.pdf``.
-
-    Returns
-    -------
-    Path
-        Where it stands.
-
-    Raises
-    ------
-    InputError
-        The suffix is another one, or the place cannot be written to.
-    StorageError
-        The disk is full or fails.
+    Raises InputError: the suffix is another one, or the place cannot be written to. Raises StorageError: the disk is full or
+    fails.
     """
     place = Path(path)
     kind = place.suffix.lower().removeprefix(".")

@@ -126,11 +126,8 @@ LEVELS = 24
 
 @style.drawn
 def surfaces_figure(kriging: Results) -> "style.Figure":
-    """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
-
-    Of a file of kind ``kriging`` the models of two variables and the clearance are drawn. Raises InputError where no model has
-    three inputs, the clearance among them.
-    """
+    """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces), of the
+    models of two variables and the clearance (kind ``kriging``). Raises InputError where there is none."""
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
     main = labels.clearance(kriging)

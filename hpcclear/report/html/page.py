@@ -52,27 +52,13 @@ class Subject(NamedTuple):
 
 
 def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
-    """Write a page from the result files in a directory, or from chosen ones.
+    """Write a page from the result files in a directory, or from chosen ones; what is missing in a directory is said on the
+    page.
 
-    Parameters
-    ----------
-    *places : path
-        A directory with any of the files of `run`, `sample`, `accuracy` and `simulate`, or files of theirs. What is missing
-        in a directory is said on the page.
-    output : path, optional
-        Of the page; report.html in the directory, or in that of the first file, by default.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    InputError
-        No such directory, no result in it, a chosen file that is none, matplotlib missing, or no permission to write.
-    StorageError
-        The disk is full or fails.
+    `places`: a directory with any of the files of `run`, `sample`, `accuracy` and `simulate`, or files of theirs; `output`: the
+    page, by default report.html in the directory, or in that of the first file. Returns the page. Raises InputError: no such
+    directory, no result in it, a chosen file that is none, matplotlib missing, or no permission to write. Raises StorageError:
+    the disk is full or fails.
     """
     content = read(*places)
     path = content.directory / NAME if output is None else Path(output)

@@ -40,14 +40,10 @@ def verdict(supported: Iterable[bool], refuted: Iterable[bool]) -> Verdict:
 
 
 class SensitivityEvidence:
-    """First-order sensitivities as evidence: effects over the ranges, by surface and clearance.
+    """First-order sensitivities (of `hpcclear.study.sensitivities.analyse`) as evidence: effects over the ranges, by surface
+    and clearance.
 
     Variables go by the paper's symbols where it has one, else by the study's own names.
-
-    Parameters
-    ----------
-    result : dict
-        Of `hpcclear.study.sensitivities.analyse`.
     """
 
     def __init__(self, run: StudyRun, result: Result) -> None:
