@@ -40,7 +40,7 @@ FEATURES = {
         "scene/workbook.py scene/clock.py scene/file_curves.py scene/points.py "
         "report/tables.py report/export.py cli/commands/export.py",
     "comparison with measurements":
-        "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
+        "report/compare.py report/merit.py report/alike.py report/figures/compared.py "
         "report/scatter.py",
     "fits of ISO 286, catalogues, costs":
         "scene/fits.py scene/fitted.py scene/choices.py scene/contacts/pin_in_bearing.py "
@@ -58,7 +58,7 @@ FEATURES = {
     "impact and noise, loads on bearings":
         "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
         "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
-        "study/loads.py scene/loads.py",
+        "study/simulations.py scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
     "compiling, its cache and widths":

@@ -1,4 +1,4 @@
-"""Every way to integrate one revolution: the kernel's methods, and two that are not the kernel's."""
+"""Every way to integrate one revolution: the methods of the kernel, and two that are not, which call its equations."""
 
 import time
 from collections.abc import Callable
@@ -10,7 +10,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from hpcclear.accuracy.equations import CalledEquations
 from hpcclear.accuracy.looked_at import QUANTITIES, end_of, neighbours
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -18,13 +17,46 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout import views
-from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE
+from hpcclear.dynamics.layout.views import Parameters, Start
+from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
+
+
+class CalledEquations:
+    """The equations of one design, `par` (PARAMETERS,) and `hpcclear.dynamics.setup.start`, for solvers that call them."""
+
+    def __init__(self, problem: Problem, par: Array, start: Start) -> None:
+        n = problem.coordinates
+        self.n = n
+        self.problem = problem
+        self.par = par
+        self.named = Parameters(par)
+        self.latched = problem.effects.latched is not None
+        self.free = problem.effects.torque is not None
+        effects = problem.effects
+        self.size = effects.first + effects.joints  # places of joints whose gaps are integrated
+        self.start = np.concatenate([start.state(n), np.zeros(self.size)])
+        self.contacts = start.contacts.copy()
+        self.origin = start
+        self.calls = 0
+        self._head = problem.motion(problem.effects, 1).address, problem.tables
+        self._seen = new_seen(n, par, self.size)
+
+    def __call__(self, time: float, y: Array) -> Array:
+        """dy/dt, shape (2 n + joints,)."""
+        self.calls += 1
+        derivative(*self._head, self.contacts, time, y, *self._seen)
+        return self._seen.rates.copy()
+
+    def joints(self, time: float, y: Array) -> Array:
+        """Gap, contact force and rate of the gap of every joint, shape (joints, 3)."""
+        derivative(*self._head, self.contacts, time, y, *self._seen)
+        return self._seen.joints
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,166 @@
-"""The `accuracy` command: every panel measured, written, drawn."""
+"""The `accuracy` command: panels one after the other, measured, kept, written, drawn."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
-from hpcclear.accuracy import averaging, integration, surrogate
-from hpcclear.accuracy.panels import Notify, Panels
-from hpcclear.accuracy.profile import Profile
+import numpy as np
+
+from hpcclear.accuracy import averaging, integration, parallel, random_inputs, spending, surrogate
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.accuracy.standin import with_case
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session, command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
+from hpcclear.results.names import KINDS
+from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+from hpcclear.statistics.surrogate.piecewise import Leaf
+
+GLANCE = 1e-2
+"""Target error of f at which the kind of motion is judged."""
+
+Notify = Callable[[str], object]
+Simulate = Callable[[Scene, str, Profile, Ranks], tuple[Array, float]]
+
+
+class Panels:
+    """Panels one after the other; what was kept is not measured again.
+
+    `notify` gets what is going on, a line at a time; `show` the dataset of all that is there whenever there is more of it.
+    """
+
+    def __init__(
+        self, scene: Scene, ranks: Ranks, profile: Profile, notify: Notify, store: Checkpoint | None,
+        show: Callable[[Results], object],
+    ) -> None:  # fmt: skip
+        self.scene, self.ranks, self.profile = scene, ranks, profile
+        self._store, self._show, self._listener = store, show, notify
+        self.values: Variables = {}
+        self.attributes: dict[str, object] = {
+            **scene.origin,
+            **program(),
+            "profile": profile.name,
+            "command": command_line(),
+            "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",
+            "repeats": f"medians of {profile.repeats} runs ({profile.outside_repeats} for scipy's solvers)",
+            "copies": f"averaging: {profile.copies} copies over {profile.revolutions} revolutions",
+            "mpi_ranks": ranks.size,
+        }
+
+    def notify(self, text: str) -> None:
+        """Say what is going on, after looking whether the run shall stop."""
+        self.ranks.raise_if_stopped()
+        self._listener(text)
+
+    def kept(self, name: str, work: Callable[[], Variables]) -> Variables:
+        """What `work` gives, or gave before."""
+        found = self._stored(name)
+        if found is None:
+            self.notify(name.replace("-", " "))
+            found = work()
+            self._save(name, found)
+        return found
+
+    def _stored(self, name: str) -> Variables | None:
+        return None if self._store is None else self._store.load_stage(name)
+
+    def _save(self, name: str, data: Variables) -> None:
+        if self._store is not None:
+            self._store.save_stage(name, data)
+
+    def panel(self, name: str, work: Callable[[], Variables]) -> None:
+        """Add the variables of a panel."""
+        self.values.update(self.kept(name, work))
+        self._show(self.content(whole=False))
+
+    def timed_panel(self, name: str, work: Callable[[], Variables]) -> None:
+        """The same of work that is no stage by itself."""
+        with self.ranks.stage(name):
+            self.panel(name, work)
+
+    def content(self, *, whole: bool = True) -> Results:
+        """Kind ``accuracy``, of all that is there."""
+        known = KINDS["accuracy"].coords
+        coords = {name: value for name, value in self.values.items() if name in known}
+        data = {name: value for name, value in self.values.items() if name not in known}
+        return dataset.dataset("accuracy", coords, data, self.attributes, whole=whole)
+
+    def add_motion(self) -> None:
+        """What kind of motion it is, as an attribute."""
+
+        def work() -> Variables:
+            scene = self.scene.with_(
+                {"numerics.target_error": GLANCE, "numerics.objective_joints": ()}
+                | {self.scene.objective_key: MEAN_GAP.name}  # which a steady mean is of
+            )
+            with self.ranks.stage("motion"):
+                record = evaluate_records(scene, Points((), np.empty((1, 0)), ()))[0]
+            status = Status(int(record["status"]))
+            return {"words": np.array(in_a_line(record) if status.valid else status.message)}
+
+        self.attributes["motion"] = str(self.kept("motion", work)["words"])
+
+    def add_spending(self) -> None:
+        """Error of a steady mean against time; goes on from the copies that were kept, a doubling at a time."""
+        found = self._stored("copies")
+        run = spending.Run.of(self.scene) if found is None else spending.Run(**found)
+        if found is None:
+            self.notify("tolerance and revolutions")
+        else:
+            self._shown(run)
+        with self.ranks.stage("spending"):
+            until, check = self.profile.segments, self.ranks.raise_if_stopped
+            for longer in spending.measure(self.scene, run, until, check):
+                self._save("copies", vars(longer))
+                self._shown(longer)
+
+    def _shown(self, run: spending.Run) -> None:
+        self.values.update(spending.analyse(run).variables)
+        self._show(self.content(whole=False))
+
+    def add_study(self) -> None:
+        """Surrogates and random inputs: their simulations are kept apart from what follows from them."""
+        studied, case, where = with_case(self.scene)
+        self.attributes["study"] = where
+        profile, ranks = self.profile, self.ranks
+
+        def simulated(simulate: Simulate) -> Callable[[], Variables]:
+            def work() -> Variables:
+                values, each = simulate(studied, case, profile, ranks)
+                return {"values": values, "each": np.array(each)}
+
+            return work
+
+        designs = self.kept("simulations-of-designs", simulated(surrogate.simulate))
+        seconds = float(designs["each"])
+
+        @cache
+        def fitted() -> tuple[Variables, Leaf]:
+            return surrogate.measure(studied, case, profile, designs["values"], seconds)
+
+        self.panel("surrogates", lambda: fitted()[0])
+        draws = self.kept("simulations-of-draws", simulated(random_inputs.simulate))
+
+        def moments() -> Variables:
+            values, each = draws["values"], float(draws["each"])
+            return random_inputs.measure(studied, case, fitted()[1], profile, values, each)
+
+        self.panel("random-inputs", moments)
+        self.panel("ranks", lambda: parallel.measure(studied, case, seconds, profile, ranks))
+        count = parallel.samples_of(seconds, profile)
+        self.attributes["batch"] = f"ranks: {count} samples, or as many a rank"
+
 
 FILE = "accuracy.nc"
 

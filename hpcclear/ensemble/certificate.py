@@ -122,9 +122,7 @@ class Book:
 
     def all(self, off: Variant) -> VariantResult:
         """All that was seen of a variant."""
-        return VariantResult(
-            *(np.concatenate(parts) for parts in zip(*self.seen[off], strict=True))
-        )
+        return VariantResult(*map(np.concatenate, zip(*self.seen[off], strict=True)))
 
     def changes(self, off: Variant) -> Changes:
         """By how much a variant differs from the whole scene, over the replicates of both."""
@@ -208,9 +206,8 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
 
 def _decidable(book: Book, off: Variant) -> bool:
     """Whether more replicates may decide a change: not where too many have failed."""
-    return book.verdict(off) is Verdict.UNDECIDED and bool(
-        np.isfinite(book.changes(off).mean.value)
-    )
+    known = bool(np.isfinite(book.changes(off).mean.value))
+    return known and book.verdict(off) is Verdict.UNDECIDED
 
 
 def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> list[Variant]:

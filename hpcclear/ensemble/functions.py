@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -113,10 +114,8 @@ def bifurcation(
     """
     angle = number_of("section", str(section), "rad")
     seen = Observation(observe, angle, transient, revolutions)
-    return in_process(
-        lambda place, ranks, options: run_bifurcation(scene, x, place, ranks, seen, options),
-        output, progress,
-    )  # fmt: skip
+    run = partial(run_bifurcation, scene, x, observation=seen)
+    return in_process(lambda place, ranks, how: run(place, ranks, options=how), output, progress)
 
 
 def wear(scene: Scene, *, output: str | Path | None = None, progress: str = "auto") -> xr.Dataset:

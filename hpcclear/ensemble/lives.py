@@ -37,15 +37,11 @@ def revolution_times(scene: Scene, inputs: Points | None) -> Array:
     """Duration (n,) of a revolution of each life, s, at the nominal speed: of a torque drive, the one its entries expect."""
     if inputs is None:
         return Parameters(parameters(scene)).period
-    driven = [
-        (path, inputs.values[:, k])
-        for k, paths in enumerate(inputs.paths)
-        for path in paths
-        if ".wear." not in path
-    ]
-    values = np.array([column for _, column in driven]).reshape(-1, len(inputs)).T
-    names = tuple(path for path, _ in driven)
-    return Parameters(parameters(scene, Points(names, values, tuple((n,) for n in names)))).period
+    driven = [(path, k) for k, paths in enumerate(inputs.paths) for path in paths]
+    names, columns = [path for path, _ in driven if ".wear." not in path], inputs.values.T
+    values = np.array([columns[k] for path, k in driven if path in names])
+    points = Points(tuple(names), values.reshape(-1, len(inputs)).T, tuple((n,) for n in names))
+    return Parameters(parameters(scene, points)).period
 
 
 def relief_of(scene: Scene) -> Relief:
@@ -130,9 +126,7 @@ def _of_lives(lives: list[Life]) -> dict[str, Array]:
         "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
         "simulations": np.array([one.simulations for one in lives]),
         "ending": np.array([int(one.status) for one in lives], np.int8),
-        "flags": np.array(
-            [0 if one.certain else int(Flag.TARGET_MISSED) for one in lives], np.int8
-        ),
+        "flags": np.array([int(Flag.TARGET_MISSED) * (not one.certain) for one in lives], np.int8),
     }
 
 
@@ -143,9 +137,8 @@ def _causes(inputs: Points | None, joints: Joints, lives: list[Life], last: list
     growth = grown / np.where(ended > 0.0, ended, np.nan)[:, None]
     if inputs is None:
         return np.empty((0, growth.shape[1]))
-    return np.array(
-        [[rank_correlation(column, one) for one in growth.T] for column in inputs.values.T]
-    )
+    columns = inputs.values.T
+    return np.array([[rank_correlation(column, one) for one in growth.T] for column in columns])
 
 
 def _reason(one: Life) -> str:

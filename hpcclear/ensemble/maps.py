@@ -32,9 +32,8 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     """
     name, _, rest = words.partition("=")
     parts = rest.split(":")
-    wrong = InputError(
-        "map", words, "is not PATH=LO:HI:N", 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
-    )  # fmt: skip
+    example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
+    wrong = InputError("map", words, "is not PATH=LO:HI:N", example)
     if len(parts) != 3 or not name:
         raise wrong
     paths = paths_of(scene, name)
@@ -58,10 +57,8 @@ def _number(words: str, unit: str) -> float:
     except ValueError:
         return to_si(words.strip().strip('"'), unit)
     if unit == "rad/s":  # a slip for rpm is a factor of ten
-        note(
-            words,
-            f"{value:g} rad/s, {value * 30.0 / np.pi:.5g} rpm; if rpm are meant, write {value:g} rpm",
-        )
+        turns = f"{value * 30.0 / np.pi:.5g} rpm; if rpm are meant, write {value:g} rpm"
+        note(words, f"{value:g} rad/s, {turns}")
     return value
 
 
@@ -104,12 +101,8 @@ def make_mapper(payload: Payload, ranks: Ranks) -> "SteadyEvaluator":
 
 
 def run_map(
-    scene: Scene,
-    axes: tuple[str, ...],
-    output: Path,
-    ranks: Ranks,
-    options: Options = DEFAULT_OPTIONS,
-) -> Finished:
+    scene: Scene, axes: tuple[str, ...], output: Path, ranks: Ranks, options: Options = DEFAULT_OPTIONS
+) -> Finished:  # fmt: skip
     """Judge every cell of a grid of one or two axes (``PATH=LO:HI:N``) on all ranks and write it, a sample a cell; on root.
 
     `grid` gives the file back as a grid. Raises InputError, StorageError, Stopped, RankFailed.

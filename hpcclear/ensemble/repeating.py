@@ -11,6 +11,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
 from hpcclear.ensemble.samples import samples_of
+from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
@@ -80,15 +81,11 @@ def _compared(name: str, content: Results, kind: str, count: int) -> Repeated:
 
 def _samples(content: Results, scene: Scene) -> Results:
     """The same designs, simulated here."""
-    rows = {
-        str(name): one
-        for name, one in content.data_vars.items()
-        if one.attrs.get("role") == "design_variable"
-    }
-    paths = {str(one.attrs.get("scene_path", name)): one for name, one in rows.items()}
-    points = as_points(scene, {path: one.values for path, one in paths.items()})
+    rows = labels.design_variables(content)
+    values = {str(one.attrs.get("scene_path", one.name)): one.values for one in rows}
+    points = as_points(scene, values)
     records = evaluate_records(scene, points)
-    named = replace(points, names=tuple(rows))
+    named = replace(points, names=tuple(one.name for one in rows))
     return samples_of(named, records, {}, scene.objective, scene.joint_labels)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -78,11 +79,9 @@ def run_sample(
 def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
     """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
     session.describe(scene)
-    if len(points) * MEMORY >= NOTABLE:
-        session.notify(
-            f"root keeps all {len(points)} samples in memory, {len(points) * MEMORY:.1f} GB at the end; "
-            "Monte Carlo samples it can write as they come: --statistics --raw DIR"
-        )
+    if (memory := len(points) * MEMORY) >= NOTABLE:
+        text = f"root keeps all {len(points)} samples in memory, {memory:.1f} GB at the end; Monte Carlo samples it can write"
+        session.notify(f"{text} as they come: --statistics --raw DIR")
     checkpoint = session.opened(points.units)
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)
@@ -105,12 +104,12 @@ def samples_of(
     joints: Sequence[str] = JOINTS,
 ) -> Results:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
-    drawn = {"sampling": points.sampling} if points.sampling else {}
-    designs = points.names, points.values, points.units
-    about, words = {**attributes, **drawn}, points.words
-    return dataset.samples_dataset(
-        *designs, records, about, objective, words, joints, points.labels
+    about = {**attributes, "sampling": points.sampling} if points.sampling else attributes
+    designs, words = (
+        (points.names, points.values, points.units),
+        (points.words, joints, points.labels),
     )
+    return dataset.samples_dataset(*designs, records, about, objective, *words)
 
 
 def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:
@@ -123,9 +122,8 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
     with Session(place, sample_key(scene, points), ranks, DEFAULT_OPTIONS) as session:
         samples = session.found("samples")
         if samples is None:
-            records = np.concatenate(
-                [_records(part, scene, points, output) for part in whole(output)]
-            )
+            parts = [_records(part, scene, points, output) for part in whole(output)]
+            records = np.concatenate(parts)
             session.describe(scene)
             samples = _write(session, scene, points, records)
     return Finished(samples, place.output, place.timing)
@@ -200,14 +198,8 @@ def sample_points(
         with ranks.stage(stage), ranks.writing():
             checkpoint.flush()
 
-    due = checkpoint.flush_when_due
+    run = partial(
+        leading.run_points, ranks, task, sent.values, completed=completed, on_records=take
+    )
     with saving(save):
-        return leading.run_points(
-            ranks,
-            task,
-            sent.values,
-            completed=completed,
-            on_records=take,
-            save=due,
-            progress=progress,
-        )
+        return run(save=checkpoint.flush_when_due, progress=progress)

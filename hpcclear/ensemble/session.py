@@ -197,10 +197,7 @@ class Session:
         options: Options,
         notify: Callable[[str], object] = lambda text: sys.stderr.write(f"{plain(text)}\n"),
     ) -> None:
-        self.place = place
-        self.key = dict(key)
-        self.ranks = ranks
-        self.options = options
+        self.place, self.key, self.ranks, self.options = place, dict(key), ranks, options
         self.joints: tuple[str, ...] = JOINTS
         self.record: np.dtype = OUTCOME
         self.notify = notify
@@ -267,14 +264,9 @@ class Session:
         """What an earlier run left unfinished; `units`: of its design variables, by their names."""
         with self.writing():
             self._checkpoint = Checkpoint(
-                self.place.parts,
-                self.key,
-                interval=self.options.interval,
-                units=units,
-                attributes=self.attributes,
-                joints=self.joints,
-                record=self.record,
-            )
+                self.place.parts, self.key, interval=self.options.interval, units=units,
+                attributes=self.attributes, joints=self.joints, record=self.record,
+            )  # fmt: skip
         self.notify_problems()
         return self._checkpoint
 

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,11 +53,9 @@ def responses_of(
         records = leading.run_points(ranks, task, rows)
     else:
         keeper = _Keeper(checkpoint, kept or stage, dtype)
-        done, due = keeper.records, keeper.flush_when_due
+        run = partial(leading.run_points, ranks, task, rows, completed=keeper.records)
         with saving(keeper.flush):
-            records = leading.run_points(
-                ranks, task, rows, completed=done, on_records=keeper.take, save=due
-            )
+            records = run(on_records=keeper.take, save=keeper.flush_when_due)
     return records["values"].reshape(len(variants), copies, *shape)
 
 
@@ -134,10 +133,6 @@ class Responses:
         """Yield records (1,) of responses, simulated in one batch."""
         scenes = [self._scene.with_(self._variants[variant]) for _, variant, _ in taken]
         for k, response in simulate_together(scenes, [copy for _, _, copy in taken]):
-            yield self._record(taken[k][0], scenes[k], response)
-
-    def _record(self, sample: int, scene: Scene, response: Results) -> np.ndarray:
-        """The record (1,) of a response."""
-        records = np.zeros(1, self._dtype)
-        records["sample"], records["values"] = sample, self._evaluate(scene, response).ravel()
-        return records
+            record, values = np.zeros(1, self._dtype), self._evaluate(scenes[k], response)
+            record["sample"], record["values"] = taken[k][0], values.ravel()
+            yield record

@@ -62,15 +62,12 @@ def whole(output: Path) -> list[Part]:
     """
     escaped = (re.escape(word) for word in (output.stem, output.suffix))
     form = re.compile(r"{}\.part-(\d+)-of-(\d+){}".format(*escaped))
-    there = [
-        found.groups() for path in output.parent.glob("*") if (found := form.fullmatch(path.name))
-    ]
-    counts = sorted({int(count) for _, count in there})
+    found = filter(None, (form.fullmatch(path.name) for path in output.parent.glob("*")))
+    counts = sorted({int(one[2]) for one in found})
     if not counts:
         reason = f"no part of it exists, such as {Part(1, 20).place(output).name}"
-        raise InputError(
-            "output", str(output), reason, "Run hpcclear sample with --part 1/20, 2/20, ..."
-        )
+        remedy = "Run hpcclear sample with --part 1/20, 2/20, ..."
+        raise InputError("output", str(output), reason, remedy)
     if len(counts) > 1:
         reason = f"parts of different divisions exist, by {' and by '.join(map(str, counts))}"
         raise InputError("output", str(output), reason, "Move the parts of one division away")
@@ -79,7 +76,6 @@ def whole(output: Path) -> list[Part]:
     if missing:
         shown = ", ".join(map(str, missing[:20])) + (", ..." if len(missing) > 20 else "")
         reason = f"of {counts[0]} parts {len(missing)} are missing"
-        raise InputError(
-            "--part", shown, reason, "Run hpcclear sample with each of these, then merge again"
-        )
+        remedy = "Run hpcclear sample with each of these, then merge again"
+        raise InputError("--part", shown, reason, remedy)
     return every

@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -66,12 +67,10 @@ def run_statistics(
         method = None if scene.study is None else scene.study.method
         reason = "statistics are streamed for Monte Carlo samples only"
         raise InputError("study.method", method, reason, 'Set method = "monte-carlo" in [study]')
-    tables = [one.name for one in scene.study.variables if one.rows]
-    if tables:
-        raise InputError(
-            f"study.variables.{tables[0]}", None, "statistics are not streamed over the rows of a table",
-            "Use `sample` without --statistics, or leave the variable out",
-        )  # fmt: skip
+    for name in [one.name for one in scene.study.variables if one.rows]:
+        reason = "statistics are not streamed over the rows of a table"
+        remedy = "Use `sample` without --statistics, or leave the variable out"
+        raise InputError(f"study.variables.{name}", None, reason, remedy)
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     key = statistics_key(scene, len(points))
@@ -126,12 +125,9 @@ class _Streaming:
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
     ) -> None:
         session.describe(scene)
-        self._payload = payload_of(scene, points.page(0))
-        self._objective = scene.objective
-        self._points = points
-        self._session = session
+        self._payload, self._objective = payload_of(scene, points.page(0)), scene.objective
+        self._points, self._session, self._raw = points, session, raw
         self._checkpoint = session.opened()
-        self._raw = raw
         self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
         session.notify_problems()
@@ -140,9 +136,8 @@ class _Streaming:
         elif earlier is not None:
             self._sums.restore(earlier)
             if raw is not None and (gone := _missing(raw, self._sums.summed_blocks())):
-                session.notify(
-                    f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
-                )
+                text = f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
+                session.notify(text)
                 self._sums = self._new_sums()
         self._saved = time.monotonic()
 
@@ -164,12 +159,8 @@ class _Streaming:
         with saving(self._save), LongProgress("samples", style, sums.total, sums.taken) as progress:
             while (left := sums.remaining(1 if sums.edges is None else TOGETHER)).size:
                 self._simulate(left, progress)
-        return self._session.write(self._dataset())
-
-    def _dataset(self) -> Results:
-        return statistics_dataset(
-            self._sums, self._session.attributes, self._objective, self._session.joints
-        )
+        about = self._session.attributes, self._objective, self._session.joints
+        return self._session.write(statistics_dataset(self._sums, *about))
 
     def _save(self) -> None:
         with self._session.ranks.writing():
@@ -189,15 +180,9 @@ class _Streaming:
             numbered["sample"] = left[records["sample"]]
             self._sums.add(numbered)
 
-        leading.run_points(
-            self._session.ranks,
-            Task(STAGE, make_evaluator, self._payload, self._session.record),
-            _Left(self._points, left),
-            on_records=take,
-            save=self._save_when_due,
-            progress=progress,
-            keep=False,
-        )
+        task = Task(STAGE, make_evaluator, self._payload, self._session.record)
+        run = partial(leading.run_points, self._session.ranks, task, _Left(self._points, left))
+        run(on_records=take, save=self._save_when_due, progress=progress, keep=False)
 
 
 def statistics_dataset(

@@ -39,59 +39,47 @@ PERTURBATION = 1e-9
 def check_worn(scene: Scene) -> None:
     """Refuse a scene that has no lives to follow. Raises InputError."""
     if scene.wear is None:
-        raise InputError(
-            "wear", None, "the scene has no [wear] table", "Add [wear], as in jobs/wear.toml"
-        )  # fmt: skip
+        reason, remedy = "the scene has no [wear] table", "Add [wear], as in jobs/wear.toml"
+        raise InputError("wear", None, reason, remedy)
     if not scene.worn_joints():
-        raise InputError(
-            "joints", None, "no joint of the scene wears", "Give one a table wear, as in jobs/wear.toml"
-        )  # fmt: skip
+        reason, remedy = (
+            "no joint of the scene wears",
+            "Give one a table wear, as in jobs/wear.toml",
+        )
+        raise InputError("joints", None, reason, remedy)
     alike = scene.study is None or not of_lives(scene).required_study.random
     if scene.wear.lives > 1 and alike:
-        raise InputError(
-            "wear.lives", scene.wear.lives, "without random inputs all service lives are the same",
-            "Add [study.random], or simulate one service life",
-        )  # fmt: skip
+        reason = "without random inputs all service lives are the same"
+        remedy = "Add [study.random], or simulate one service life"
+        raise InputError("wear.lives", scene.wear.lives, reason, remedy)
     if scene.study is not None and scene.study.worn and scene.wear.lives == 1:
         reason = "one service life gives no distribution of clearances"
         raise InputError("wear.lives", 1, reason, "Simulate more, such as 100")
-    for name in KINDS["wear"].data.keys() | KINDS["wear"].coords.keys():
-        if scene.study is not None and name in [row.name for row in scene.study.random]:
-            raise InputError(
-                f"study.random.{name}", name, "is the name of a result", "Rename it, and give its path"
-            )  # fmt: skip
+    named = [row.name for row in scene.study.random] if scene.study is not None else []
+    for name in (KINDS["wear"].data.keys() | KINDS["wear"].coords.keys()) & {*named}:
+        reason, remedy = "is the name of a result", "Rename it, and give its path"
+        raise InputError(f"study.random.{name}", name, reason, remedy)
     _check_bounds(scene)
-    if scene.numerics.target_error is not None:
-        raise InputError(
-            "numerics.target_error", scene.numerics.target_error,
-            "wear simulations have replicas of their own for the confidence intervals of wear rate and f",
-            "Remove it, and set wear.copies",
-        )  # fmt: skip
+    if (error := scene.numerics.target_error) is not None:
+        reason = "wear simulations have replicas of their own for the confidence intervals of wear rate and f"
+        raise InputError("numerics.target_error", error, reason, "Remove it, and set wear.copies")
 
 
 def _check_bounds(scene: Scene) -> None:
     """Refuse lives that are over when new, and a limit that no joint can reach."""
     assert scene.wear is not None
-    radii = []
+    deepest = {}
     for name in scene.worn_joints():
-        key = scene.joint_key(name)
-        clearance, radius = (scene.number(f"{key}.{it}") for it in ("clearance", "bearing_radius"))
-        radii.append(radius)
-        if clearance >= DEEPEST * radius:
-            raise InputError(
-                f"{key}.clearance", scene.shown(f"{key}.clearance"),
-                f"a bearing counts as worn through from {DEEPEST:g} of its radius on, "
-                f"{scene.shown(f'{key}.clearance', DEEPEST * radius)}",
-                "Lower it",
-            )  # fmt: skip
-    limit = scene.wear.limit.clearance
-    if limit is not None and limit > DEEPEST * max(radii):
-        raise InputError(
-            "wear.limit.clearance", scene.shown(f"{key}.clearance", limit),
-            f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, "
-            f"{scene.shown(f'{key}.clearance', DEEPEST * max(radii))}",
-            "Lower it",
-        )  # fmt: skip
+        key = f"{scene.joint_key(name)}.clearance"
+        deepest[key] = DEEPEST * scene.number(f"{scene.joint_key(name)}.bearing_radius")
+        if scene.number(key) >= deepest[key]:
+            reason = f"a bearing counts as worn through from {DEEPEST:g} of its radius on"
+            reason = f"{reason}, {scene.shown(key, deepest[key])}"
+            raise InputError(key, scene.shown(key), reason, "Lower it")
+    limit, most = scene.wear.limit.clearance, max(deepest.values())
+    if limit is not None and limit > most:
+        reason = f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, {scene.shown(key, most)}"
+        raise InputError("wear.limit.clearance", scene.shown(key, limit), reason, "Lower it")
 
 
 def of_lives(scene: Scene) -> Scene:
@@ -137,9 +125,7 @@ class States:
         """Designs of a life's copies, shape (copies, names)."""
         clearance, radius = self._joints[number].worn(asked.work)
         factors = 1.0 + PERTURBATION * np.array(asked.copies)[:, None]
-        state = np.stack(
-            [clearance * factors, np.broadcast_to(radius, factors.shape[:1] + radius.shape)], -1
-        )
+        state = np.stack([clearance * factors, np.repeat(radius[None], len(factors), axis=0)], -1)
         fixed = np.repeat(self._fixed[number][None], len(factors), axis=0)
         parts = [fixed, state.reshape(len(factors), -1)]
         if self.relief.size:
@@ -213,12 +199,9 @@ def waiting_longer(scene: Scene) -> Scene:
 
 
 def _go_on(
-    number: int,
-    asking: Asking,
-    seen: WearOutcome | None,
-    going: dict[int, tuple[Asking, Asked]],
+    number: int, asking: Asking, seen: WearOutcome | None, going: dict[int, tuple[Asking, Asked]],
     ended: dict[int, Life],
-) -> None:
+) -> None:  # fmt: skip
     """Send a life what it waited for; it requests more or ends."""
     try:
         asked = next(asking) if seen is None else asking.send(seen)
@@ -239,12 +222,8 @@ def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> Wea
 
 
 def run_wear(
-    scene: Scene,
-    output: Path,
-    ranks: Ranks,
-    options: Options = DEFAULT_OPTIONS,
-    timing: Path | None = None,
-) -> Finished:
+    scene: Scene, output: Path, ranks: Ranks, options: Options = DEFAULT_OPTIONS, timing: Path | None = None
+) -> Finished:  # fmt: skip
     """Simulate the service lives of a scene with a worn joint on all ranks and write them; on root.
 
     `timing`: where the times go, beside the output by default. Raises InputError, StorageError, Stopped, RankFailed.

@@ -1,10 +1,10 @@
-"""The true function of a study: designs to objectives, through the dynamics, on all ranks."""
+"""The true function of a study: designs to objectives, through the dynamics at all load cases, on all ranks."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.samples import sample_points
@@ -15,7 +15,39 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points, check_points
-from hpcclear.study import loads as loading
+from hpcclear.scene.variables import StudyVariable
+
+
+def at_all(loads: StudyVariable, points: Points) -> Points:
+    """Designs (n, d) at all load cases, (n * cases, d), those of a design one behind the other."""
+    options = np.array(loads.options)
+    values = np.repeat(points.values, len(options), axis=0)
+    values[:, points.names.index(loads.name)] = np.tile(options, len(points))
+    return Points(points.names, values, points.paths)
+
+
+def combined(records: Records, responses: Array, loads: StudyVariable) -> tuple[Records, Array]:
+    """A record for each design, (n,), of those at its load cases, (n * cases,), and its responses, (k, n), of theirs.
+
+    Each response is the largest or the weighted mean of the load cases; the record is that with the largest objective, whose
+    place is taken by what is made of them. A design that failed at one of them counts as failed.
+    """
+    cases = len(loads.options or ())
+    table, each = records.reshape(-1, cases), responses.reshape(len(responses), -1, cases)
+    failed = table["status"] != Status.OK
+    values = np.where(failed | np.isnan(each[0]), np.inf, each[0])
+    found: Records = table[np.arange(len(table)), values.argmax(axis=1)].copy()
+    if loads.over == "worst":
+        made = each.max(axis=2)
+    else:
+        weights = np.array(loads.over, dtype=float)
+        made = each @ (weights / weights.sum())
+    made = np.where(failed.any(axis=1), np.nan, made)
+    found["objective"] = np.where(failed.any(axis=1), found["objective"], made[0])
+    found["flags"] = np.bitwise_or.reduce(table["flags"], axis=1)
+    found["rhs_evaluations"] = table["rhs_evaluations"].sum(axis=1)
+    return found, made
+
 
 SHOWN = {"pairs": "runs at two tolerances", "chaos": "perturbed runs"}
 """Names of stages on the progress display, where the stage has another one."""
@@ -76,8 +108,8 @@ class Simulations:
         if loads is None:
             records = self._records(points, stage)
             return records, self._responses(records)
-        records = self._records(loading.at_all(loads, points), stage)
-        return loading.combined(records, self._responses(records), loads)
+        records = self._records(at_all(loads, points), stage)
+        return combined(records, self._responses(records), loads)
 
     def _responses(self, records: np.ndarray) -> Array:
         further = [self.scene.objective_named(name) for name in self.scene.required_study.further]
@@ -93,7 +125,7 @@ class Simulations:
         records, values = records[before], values[before]
         loads, found = self.scene.required_study.load_cases, self._responses(records)
         if loads is not None:
-            found = loading.combined(records, found, loads)[1]
+            found = combined(records, found, loads)[1]
             values = values[:: len(loads.options or ())]
         return values, found
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
-from hpcclear.report.figures import designs, given, labels, motion, style
+from hpcclear.report.figures import designs, labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
@@ -12,7 +12,7 @@ from hpcclear.results.content import Results
 def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure":
     """Slider motion, where there is a slider, contact forces and torque of the drive over the last two revolutions of a
     response (kind ``response``); of several by the names of their designs what `comparison_figure` shows."""
-    if every := given.several(responses):
+    if every := style.several(responses):
         return designs.comparison_figure(every)
     shown = motion.latest(cast(Results, responses))
     moved = (f"slider_{word}" for word in ("position", "velocity", "acceleration"))
