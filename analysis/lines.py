@@ -34,7 +34,7 @@ FEATURES = {
         "study/paper/* study/claims.py study/printed.py study/readings.py",
     "rare failures, worst cases, constraints tested":
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/verdicts.py "
-        "study/worst.py ensemble/corners.py cli/corners.py",
+        "study/worst.py ensemble/corners.py",
     "curves, tables and workbooks in; tables out":
         "scene/sheets.py scene/delimited.py "
         "scene/workbook.py scene/clock.py scene/file_curves.py scene/points.py "

@@ -7,7 +7,7 @@ import pytest
 import report_data as data
 
 from hpcclear.base.outcome import OUTCOME, Status
-from hpcclear.cli.corners import lines
+from hpcclear.cli.check import lines
 from hpcclear.dynamics import evaluation
 from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.report.failures import SampledVariable, explained, where

@@ -63,13 +63,10 @@ class Program(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands, a section for each group."""
-        every = self.every()
         for group, title in GROUPS.items():
-            rows = [
-                (name, one.short_help or "") for name, one in every.items() if one.group == group
-            ]
+            own = ((name, one) for name, one in self.every().items() if one.group == group)
             with formatter.section(title):
-                formatter.write_dl(rows)
+                formatter.write_dl([(name, one.short_help or "") for name, one in own])
 
 
 def _names() -> list[str]:

@@ -15,8 +15,10 @@ from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.scene.plugged import files_run
 from hpcclear.scene.study_tables import DRAWN
+from hpcclear.scene.variables import StudyVariable
 
 if TYPE_CHECKING:
+    from hpcclear.ensemble.corners import CornerOutcomes
     from hpcclear.ranks.team import Ranks
 
 
@@ -45,12 +47,10 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     if detailed():
         from hpcclear.dynamics import sizing
 
+        moving = f"{states} (positions and velocities){bristles}"
         rows = [
             *((f"effect {k}", text) for k, text in enumerate(effects, 1)),
-            (
-                "states",
-                f"{states} (positions and velocities){bristles} + {open_joints} integrals of the gaps",
-            ),
+            ("states", f"{moving} + {open_joints} integrals of the gaps"),
             ("method", method),
             ("revolutions", turns),
             ("time series", sizing.words(scene)),
@@ -121,12 +121,10 @@ def _tables(scene: Scene) -> list[tuple[str, str]]:
     from hpcclear.dynamics.planar.problem import linkage_of
     from hpcclear.dynamics.setup.problem import problem_of
 
-    problem = problem_of(scene)
+    problem, names = problem_of(scene), linkage_of(scene).curve_rows
     return [
         ("table", f"{name}: {len(curve.starts)} pieces; integration steps end at {len(stops)} rows")
-        for name, curve, stops in zip(
-            linkage_of(scene).curve_rows, problem.curves, problem.stops, strict=True
-        )
+        for name, curve, stops in zip(names, problem.curves, problem.stops, strict=True)
     ]
 
 
@@ -161,13 +159,12 @@ def _mpi(ranks: "Ranks | None") -> str:
     except InputError:
         return "none found: one process"
     mail = (ranks or alone()).mail
-    met = f"; {mail.size} ranks connected" if mail.size > 1 else ""
-    crowded = (
-        f"; {mail.node_size} ranks on {mail.node_cores} cores: more ranks than cores are slower"
-        if mail.node_size > mail.node_cores
-        else ""
-    )
-    return f"{library}{met}; {mail.node_cores} cores on this node{crowded}"
+    text = library + (f"; {mail.size} ranks connected" if mail.size > 1 else "")
+    text += f"; {mail.node_cores} cores on this node"
+    if mail.node_size <= mail.node_cores:
+        return text
+    crowded = f"{mail.node_size} ranks on {mail.node_cores} cores"
+    return f"{text}; {crowded}: more ranks than cores are slower"
 
 
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -178,40 +175,17 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
     if not detailed():
-        names = _few([one.name for one in study.variables], 20).replace(";", ",")
-        rows += [("variables", names)] if names else []
-        names = _few([row.name for row in (*study.random, *study.worn)], 20).replace(";", ",")
-        return [*rows, *([("random", names)] if names else [])]
-    for variable in study.variables:
-        loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
-        if variable.rows:
-            named = ", ".join(row.name for row in variable.rows)
-            rows.append((variable.name, f"{named}: {variable.words}{loads}"))
-        elif variable.values is not None:
-            listed = ", ".join(scene.in_unit(one, variable.unit) for one in variable.values)
-            rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
-        elif variable.range is not None:
-            lower, upper, step = (
-                "" if one is None else scene.in_unit(one, variable.unit)
-                for one in (*variable.range, variable.step)
-            )
-            step = step and f" by {step}"
-            rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
-        elif variable.ratio is not None:
-            rows.append(
-                (
-                    variable.name,
-                    f"{variable.ratio[0]:g} to {variable.ratio[1]:g}: {variable.ratio_words}",
-                )
-            )
+        short = {"variables": study.variables, "random": (*study.random, *study.worn)}
+        for label, named in short.items():
+            names = _few([one.name for one in named], 20).replace(";", ",")
+            rows += [(label, names)] if names else []
+        return rows
+    rows += [(one.name, text) for one in study.variables if (text := _ranged(scene, one))]
     for row in study.random:
         if row.parameters is not None:
-            unit = scene.unit(row.paths[0])
-            least, most = (scene.in_unit(end, unit) for end in row.span)
-            text = f"{row.shape_words}, {least} to {most}"
-            rows.append(
-                (f"{row.name} random", text + ("" if row.absolute else " about the design"))
-            )
+            least, most = (scene.in_unit(end, scene.unit(row.paths[0])) for end in row.span)
+            about = "" if row.absolute else " about the design"
+            rows.append((f"{row.name} random", f"{row.shape_words}, {least} to {most}{about}"))
     if any(case.kept for case in study.cases):
         from hpcclear.study import verdicts
 
@@ -226,10 +200,24 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
-def _over(over: str | tuple[float, ...]) -> str:
-    """How load cases make one f, in words."""
-    weights = "" if over == "worst" else ", ".join(f"{float(one):g}" for one in over)
-    return f"weights {weights}" if weights else "f of the worst"
+def _ranged(scene: Scene, one: StudyVariable) -> str:
+    """Where a variable is varied, and what it is; of load cases how they make one f; "" of one that follows others."""
+    if one.rows or one.values is not None:
+        names = [row.name for row in one.rows]
+        listed = names or [scene.in_unit(value, one.unit) for value in one.values or ()]
+        weights = one.over if one.over not in (None, "worst") else ()
+        how = (
+            f"weights {', '.join(f'{float(w):g}' for w in weights)}"
+            if weights
+            else "f of the worst"
+        )
+        loads = "" if one.over is None else f" (load cases, {how})"
+        return f"{', '.join(listed)}: {one.words}{loads}"
+    if one.range is not None:
+        lower, upper = (scene.in_unit(end, one.unit) for end in one.range)
+        step = "" if one.step is None else f" by {scene.in_unit(one.step, one.unit)}"
+        return f"{lower} to {upper}{step}: {one.words}"
+    return f"{one.ratio[0]:g} to {one.ratio[1]:g}: {one.ratio_words}" if one.ratio else ""
 
 
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -267,9 +255,8 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         whole, each = expected(scene, evaluated, each)
     rows.append(("hpcclear sample", _all(scene.study.samples, each)))
     if whole:
-        rows.append(
-            ("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan")
-        )
+        text = f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan"
+        rows.append(("hpcclear run", text))
     return rows
 
 
@@ -278,3 +265,35 @@ def _all(count: int, each: float) -> str:
     seconds = count * each
     shown = "less than 1 s" if seconds < 1.0 else duration(seconds)
     return f"{count} samples, {shown} of one core"
+
+
+def describe_corners(scene: Scene, simulate: bool) -> None:
+    """Print which corners of the ranges make no mechanism, and which fail in two revolutions, where, and what to do."""
+    from hpcclear.ensemble.corners import tried  # loads the kernel
+
+    show_rows("Corners of the study's ranges", lines(tried(scene, simulate), simulate))
+
+
+def lines(found: "CornerOutcomes", simulate: bool) -> list[tuple[str, str]]:
+    """Return label and text of each line on the corners of a study's ranges."""
+    from hpcclear.ensemble.corners import MOST
+
+    points, total = found.points, len(found.points)
+    bad = len(found.refused) + int((found.status > 0).sum())
+    does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
+    every = total < MOST or total == 2 ** len(points.names)
+    which = "all corners" if every else "a balanced selection"
+    rows = [("corners", f"{total} ({which}): {total - bad} {does}")]
+    if not bad:
+        return rows
+    from hpcclear.report import failures  # loads what reads results
+
+    units = ((name, unit or "1") for name, unit in points.units.items())
+    columns = [failures.SampledVariable(name, unit, points.column(name)) for name, unit in units]
+    for reason in dict.fromkeys(found.refused.values()):
+        hit = np.array([found.refused.get(row) == reason for row in range(total)])
+        place = failures.where(hit, columns)
+        text = f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}"
+        rows.append(("refused", text))
+    failed = failures.sentences(found.status, columns, "corners") if simulate else ()
+    return rows + [("failed", text) for text in failed]

@@ -28,11 +28,9 @@ def preview(plan: Plan, ranks: int) -> str:
     name = f"first look, {name}" if plan.first else name
     doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
     doubts += ["probably less"] if plan.first else []
-    return (
-        f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
-        f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"
-        + (f" ({'; '.join(doubts)})" if doubts else "")
-    )
+    wall = duration(plan.wall_seconds(row, simulations, ranks))
+    text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take {wall}"
+    return f"{text} on {counted(ranks)}" + (f" ({'; '.join(doubts)})" if doubts else "")
 
 
 def _percent(share: float) -> str:
@@ -50,22 +48,14 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
         box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0),
     )  # fmt: skip
     for name in ("error of f", "settings", "ms/sample", "core-h", "wall time"):
-        made.add_column(
-            name,
-            no_wrap=name != "settings",
-            overflow="fold",
-            justify="right" if name != "settings" else "left",
-        )
+        short = name != "settings"
+        made.add_column(name, no_wrap=short, overflow="fold", justify="right" if short else "left")
     for one in plan.rows:
-        total = plan.core_seconds(one, simulations, ranks)
-        made.add_row(
-            "as in file" if one.error is None else f"{one.error:.0e}",
-            one.settings(),
-            f"{1e3 * one.seconds:.3g}"
-            + (f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""),
-            f"{total / 3600:.2g}",
-            duration(plan.wall_seconds(one, simulations, ranks)),
-        )
+        reached = "as in file" if one.error is None else f"{one.error:.0e}"
+        spread = f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""
+        hours = f"{plan.core_seconds(one, simulations, ranks) / 3600:.2g}"
+        wall = duration(plan.wall_seconds(one, simulations, ranks))
+        made.add_row(reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall)
     out.print(made)
     needs = _needs(plan, row, simulations, command, ranks)
     show_rows("The job", needs if detailed() else [one for one in needs if one[0] == ON_SCREEN])
@@ -81,24 +71,19 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
 def _needs(
     plan: Plan, row: Row, simulations: int, command: str, ranks: int
 ) -> list[tuple[str, str]]:
+    memory = f"{plan.memory / 2**20:.0f} MB per rank, {simulations * 1e-6:.2g} GB more on rank 0"
     rows = [
         ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.3g}"),
         ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
         ("start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"),
-        (
-            "memory",
-            f"{plan.memory / 2**20:.0f} MB per rank, {simulations * 1e-6:.2g} GB more on rank 0",
-        ),
+        ("memory", memory),
         ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
     ]
     if row.reached:
         rows.append(("reached", row.reached))
     if command == "run":
-        text = (
-            f"and {plan.responses} single responses; rejected surrogates and tight constraints need more. "
-            "Single responses, fits and search run on one core"
-        )
-        rows.append(("simulations", f"{simulations}, {text}"))
+        text = f"{simulations}, and {plan.responses} single responses; rejected surrogates and tight constraints need more"
+        rows.append(("simulations", f"{text}. Single responses, fits and search run on one core"))
         rows.append(("hpcclear sample", f"{plan.samples} simulations"))
     return rows
 

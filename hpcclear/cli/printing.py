@@ -121,9 +121,8 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
     for one in first.trust[:trust]:
         label = "trust" if one is first.trust[0] else ""
         lines = _wrapped(fitting(one.text), 14)
-        yield Text.assemble(
-            f"{label:6}", (f"{one.level.name.lower():6}", _COLOURS[one.level]), f"  {lines[0]}"
-        )
+        level = f"{one.level.name.lower():6}", _COLOURS[one.level]
+        yield Text.assemble(f"{label:6}", level, f"  {lines[0]}")
         yield from (Text(" " * 14 + line) for line in lines[1:])
     for label, text in (("scatter", first.causes), ("note", first.remark)):
         yield from _labelled(label, text)
@@ -169,8 +168,11 @@ def _print(out: Any, part: object) -> None:
             out.print(part["text"], soft_wrap=True)
     else:
         whole: Any = part
-        rows = (
-            [fitting(str(cell["words"] if isinstance(cell, Mapping) else cell)) for cell in row]
-            for row in whole.rows
+        header, *rows = (
+            [fitting(_in_words(cell)) for cell in row] for row in (whole.header, *whole.rows)
         )
-        out.print(table(whole.caption, rows, [fitting(str(head)) for head in whole.header]))
+        out.print(table(whole.caption, rows, header))
+
+
+def _in_words(cell: Any) -> str:
+    return str(cell["words"] if isinstance(cell, Mapping) else cell)

@@ -35,13 +35,11 @@ def run(written: cli.Written, cost: bool, sketch: Path | None) -> int:
         from hpcclear.scene import load_scene
 
         scene = load_scene(*written)
-        from hpcclear.cli.check import describe_scene, draw  # not for a scene that is refused
+        from hpcclear.cli import check  # not for a scene that is refused
 
-        turns = describe_scene(scene, cost, ranks)
+        turns = check.describe_scene(scene, cost, ranks)
         if scene.study is not None and scene.study.variables:
-            from hpcclear.cli.corners import describe
-
-            describe(scene, cost)
+            check.describe_corners(scene, cost)
         if sketch is not None:
-            draw(scene, sketch)
+            check.draw(scene, sketch)
         sys.exit(Exit.DONE if turns else Exit.FAILED)

@@ -41,10 +41,8 @@ def _repeat(place: Path, samples: int, trust: bool) -> int:
     with trusting(trust):
         found = list(repeated(place, samples))
     for one in found:
-        said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
-        cli.show(
-            f"{one.file}: {one.extent}" + ("" if one.extent.startswith("not") else f": {said}")
-        )
+        said = ": not the same: " + ", ".join(one.differing) if one.differing else ": the same"
+        cli.show(f"{one.file}: {one.extent}{'' if one.extent.startswith('not') else said}")
     for text in dict.fromkeys(text for one in found for text in one.changed):
         cli.show(f"made by another {text}")
     if not found:

@@ -27,13 +27,7 @@ def run(
         from hpcclear.report.html.content import read
         from hpcclear.study import run_study
 
-        place = run_study(
-            scene,
-            cli.place_of(output),
-            ranks,
-            fresh=fresh,
-            progress_style=progress,
-            notify=lambda text: cli.say(text),
-        )
+        how = {"fresh": fresh, "progress_style": progress, "notify": cli.say}
+        place = run_study(scene, cli.place_of(output), ranks, **how)
         describe(read(place), place / "verification.nc")
     return Exit.DONE

@@ -22,9 +22,8 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
     if keep is not None:
-        written = written._replace(
-            overrides=(*written.overrides, f"output.keep_revolutions={keep}")
-        )
+        overrides = (*written.overrides, f"output.keep_revolutions={keep}")
+        written = written._replace(overrides=overrides)
     scene = cli.read_scene(written)
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
