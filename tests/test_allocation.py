@@ -93,7 +93,7 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     parts = {"verification": found, "contributions": opened.read(tmp_path / "a/contributions.nc")}
     lines = {line.label: line.text for line in answer(parts)}
     own = parts["contributions"].sel(design="a alpha")
-    assert "most for its cost" in "".join(scatter.tighten(own))
+    assert "most for its cost" in scatter.tighten(own)
     assert "lightest" not in lines.get("near", "")  # widths of masses are no masses
     prices = parts["contributions"]["halving_cost"].sel(design="a alpha").to_numpy()
     assert prices == pytest.approx(costs / widths, rel=1e-9)

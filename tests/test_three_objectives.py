@@ -192,7 +192,7 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
         assert 0.0 <= point["at"][2] <= RIM
     gamma = next(point for point in shown["points"] if point["name"] == "three gamma")
     assert [THIRD, "0"] in gamma["direct"]
-    part = designs.designs(content)
+    part = designs.designs(content.files["verification"], content)
     assert part is not None
     table = next(one for one in part if not isinstance(one, str))
     assert table.header[-4:] == ["objective 1", "objective 2", "objective 3", "constraints"]
