@@ -36,16 +36,8 @@ def unboxed(value: object) -> object:
 class InputError(ValueError):
     """Bad input; the command line prints the message and exits with code 2.
 
-    Parameters
-    ----------
-    key : str
-        Where the value stands: a dotted scene path, an option, or a file.
-    value : object
-        What was found there.
-    reason : str
-        Why it cannot be used.
-    remedy : str
-        What to write instead.
+    `key`: where the value stands, a dotted scene path, an option, or a file; `value`: what was found there; `reason`: why it
+    cannot be used; `remedy`: what to write instead.
     """
 
     def __init__(self, key: str, value: object, reason: str, remedy: str) -> None:
@@ -121,14 +113,7 @@ def content_of(path: Path, what: str, most: int, remedy: str, shorter: str) -> b
 class StorageError(RuntimeError):
     """The disk refused a write; what was there before is intact. Exit code 1.
 
-    Parameters
-    ----------
-    path : str
-        The file that was to be written.
-    reason : str
-        What the operating system said.
-    remedy : str
-        What to do about it.
+    `path`: the file that was to be written; `reason`: what the operating system said; `remedy`: what to do about it.
     """
 
     def __init__(self, path: str, reason: str, remedy: str) -> None:
