@@ -61,9 +61,7 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
             first = last = now
         if (day is None, zoned) != (first[0] is None, first[3]):
             reason = "is a time of another kind than those above it"
-            raise InputError(
-                where(row), cell, reason, "Write date, time and zone of all rows alike"
-            )
+            raise InputError(where(row), cell, reason, "Write date, time and zone in one way")
         if day is None and last[1] - whole > (period := _period(found)) / 2:
             gone += period
         days = (day or 0) - (first[0] or 0)

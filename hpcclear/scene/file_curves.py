@@ -205,9 +205,8 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
     span = angles[-1] - angles[0]
     if span > 2 * TURN * (1 + 1e-6):
         reason = f"goes over {math.degrees(span):.6g} deg, more than two turns"
-        raise InputError(
-            *where, reason, "Give one turn, or two of a four-stroke engine; average cycles first"
-        )
+        remedy = "Give one turn, or the two of a four-stroke engine; average cycles first"
+        raise InputError(*where, reason, remedy)
     turns = 1 if span <= TURN * (1 + 1e-6) else 2
     step = float(np.median(np.diff(angles)))
     gaps = np.append(np.diff(angles), max(turns * TURN - span, 0.0))

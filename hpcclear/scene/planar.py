@@ -51,8 +51,9 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
         ends = [point for own, _, point in places if own == body.name]
         held.update(ends)
         if ends and joint.kind in ("slide", "fixed"):
-            reason = f"{joint.name} guides the bar, but the modes are those of pinned ends"
-            raise invalid(reason, "Leave bending out")
+            raise invalid(
+                f"{joint.name} guides it, but modes are of pinned ends", "Leave bending out"
+            )
         if ends and getattr(joint, "out_of_round", None) is not None:
             reason = f"surfaces of {joint.name} are out of round, which needs rigid bodies"
             raise invalid(reason, "Leave out bending, or out_of_round")

@@ -44,7 +44,8 @@ class Points:
     def __post_init__(self) -> None:
         values, count = np.array(self.values, dtype=np.float64), len(self.names)
         if values.ndim != 2 or values.shape[1] != count or len(self.paths) != count:
-            raise InputError("points", values.shape, "one column per name is needed", "Give (n, d)")
+            reason = "one column per name is needed"
+            raise InputError("points", values.shape, reason, "Give an (n, d) array")
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
 

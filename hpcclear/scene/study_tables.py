@@ -267,8 +267,7 @@ class StudyTables(Table):
             remedy = f"Add study.variables.{row.name} with a range or values, or write it in SI"
             raise invalid(reason, remedy, f"random.{row.name}.half_width")
         if own is not None and not own.paths:
-            reason = "its variable has no numbers to scatter about"
-            raise invalid(reason, "Name another entry", f"random.{row.name}")
+            raise invalid("its variable has no number", "Name another entry", f"random.{row.name}")
         for design in self._extremes(row):
             try:
                 self.law(row, design)

@@ -185,9 +185,8 @@ def _check_corner(
     except ValidationError as error:
         said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
         reason = getattr(said, "reason", "it is not valid")
-        raise invalid(
-            f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key
-        ) from None
+        reason = f"reaches {words}, which makes no mechanism: {reason}"
+        raise invalid(reason, "Narrow it", key) from None
 
 
 def _check_depth(content: Tables) -> None:
