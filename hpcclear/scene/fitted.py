@@ -95,9 +95,7 @@ def entry_replaced(content: Tables, path: str, value: object) -> Content:
     return made
 
 
-def _rows_of_fits(
-    content: Tables,
-) -> Iterator[tuple[str, Tables, list[Tables]]]:
+def _rows_of_fits(content: Tables) -> Iterator[tuple[str, Tables, list[Tables]]]:
     """Random inputs of the distribution "fit": names, rows, and the open joints whose clearances they drive."""
     for name, row in table_at(content, "study.random").items():
         if isinstance(row, Mapping) and row.get("distribution") == "fit":

@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
+from hpcclear.base.quantiles import Empirical
 from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.random_inputs import RandomInput
@@ -51,7 +52,7 @@ def latin_hypercube(
     coordinates = region.lower + unit * (region.upper - region.lower)
     for column, name in enumerate(region.names):
         if (options := study.variable(name).options) is not None:
-            coordinates[:, column] = _of_options(options, unit[:, column])
+            coordinates[:, column] = Empirical(options)(unit[:, column])
     points = points_at(scene, region.names, coordinates)
     check_points(scene, points)
     return points
@@ -163,15 +164,9 @@ def _free(study: Study, name: str, place: Array) -> Array:
     """A variable without a distribution, uniform over its range, at probabilities (n,)."""
     variable = study.variable(name)
     if variable.options is not None:
-        return _of_options(variable.options, place)
+        return Empirical(variable.options)(place)
     lower, upper = variable.bounds
     return lower + place * (upper - lower)
-
-
-def _of_options(options: Sequence[float], place: Array) -> Array:
-    """Values of a variable that takes some only, each as often as another, of numbers from 0 to 1, (n,)."""
-    count = len(options)
-    return np.array(options)[np.minimum((place * count).astype(np.int64), count - 1)]
 
 
 def _by_designs(

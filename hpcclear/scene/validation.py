@@ -23,6 +23,7 @@ from hpcclear.scene.variables import StudyVariable
 
 Valid = TypeVar("Valid", bound=Table)
 Whole = TypeVar("Whole", bound=SceneTables)
+Location = tuple[int | str, ...]
 
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
 _TAGGED = (("mechanism",), ("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
@@ -208,12 +209,10 @@ def _translated(error: ErrorDetails, content: Tables, more: int) -> InputError:
     if error["type"].startswith("union_tag"):
         names, found = (*names, "kind"), found.get("kind")
     reason, remedy = _explained(error, found, ".".join(names))
-    return _wrong(names, found, reason, remedy, more)
+    return _wrong(".".join(names), found, reason, remedy, more)
 
 
-def _told(
-    said: InputError, location: tuple[int | str, ...], content: object, more: int = 0
-) -> InputError:
+def _told(said: InputError, location: Location, content: object, more: int = 0) -> InputError:
     """An error of `invalid` with the whole key of its entry, and what stands there."""
     names, found = _follow(location, content)
     if said.key:
@@ -221,13 +220,10 @@ def _told(
         names += below
     if said.value is not ... and (found is None or isinstance(found, (Mapping, list))):
         found = said.value
-    return _wrong(names, found, said.reason, said.remedy, more)
+    return _wrong(".".join(names), found, said.reason, said.remedy, more)
 
 
-def _wrong(
-    names: tuple[str, ...], found: object, reason: str, remedy: str, more: int
-) -> InputError:
-    key = ".".join(names)
+def _wrong(key: str, found: object, reason: str, remedy: str, more: int) -> InputError:
     usual = _USUAL.get(_unit(key)) if re.search("smaller|below|at most|fit into", reason) else None
     if usual and isinstance(found, (int, float)) and 0 < found < LARGEST:
         size = found / float(factor(usual, _unit(key)))
@@ -243,7 +239,7 @@ def _unit(path: str) -> str:
     return found.unit if found else ""
 
 
-def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ...]:
+def _untagged(location: Location, kind: str) -> Location:
     """A location without the tag that pydantic adds below a table whose kind decides its fields."""
     if location[:2] == ("mechanism", "planar"):
         return "mechanism", *_untagged(location[2:], kind)
@@ -256,7 +252,7 @@ def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ..
     return location
 
 
-def _follow(location: tuple[int | str, ...], content: object) -> tuple[tuple[str, ...], Any]:
+def _follow(location: Location, content: object) -> tuple[tuple[str, ...], Any]:
     """The keys along a location, and what stands there in the raw content (None if nothing does)."""
     names: list[str] = []
     for step in location:
