@@ -4,8 +4,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from pydantic import field_validator
-
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
@@ -41,16 +39,12 @@ def _clearance_of_open_joints(data: Mapping[str, Any]) -> Mapping[str, Any]:
 class ConsistentTables(SceneTables):
     """The tables of a scene file, each fitting the others."""
 
-    @field_validator("format_version", mode="before")
-    @classmethod
-    def _version_is_a_number(cls, value: object) -> object:
-        if isinstance(value, bool):  # equal to 1 in Python
-            raise invalid("true or false is not a version", "Write format_version = 1")
-        return value
-
     @classmethod
     def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
         """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
+        if isinstance(row.get("format_version"), bool):  # equal to 1 in Python
+            reason = "true or false is not a version"
+            raise invalid(reason, "Write format_version = 1", "format_version")
         data = _clearance_of_open_joints(row)
         mechanism = data.get("mechanism")
         if not isinstance(mechanism, Mapping):

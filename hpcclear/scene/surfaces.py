@@ -45,10 +45,6 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
         raise invalid(reason, "Write the roughness of both surfaces together", "film.roughness")
 
 
-MOST_WAVES = 8
-"""Around a surface."""
-
-
 class SurfaceWaves(Table):
     """Depth of a surface below the round one, m: a Fourier series in the angle around it. The angle is measured from
     the x axis of the body; in a slider-crank this axis points from the first joint of a link to its second.
