@@ -33,7 +33,8 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     """
     try:
         about = path.lstat()
-        if stat.S_ISLNK(about.st_mode) and not _among_devices(path):
+        # /dev/stdout is a link, at times to a file
+        if stat.S_ISLNK(about.st_mode) and path.parent.resolve() != Path("/dev"):
             about = path.stat()
             ours = stat.S_ISREG(about.st_mode)
         else:
@@ -50,11 +51,6 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
             reason = "the existing file was not written by hpcclear, or it was cut off"
             remedy += ", or move that file away"
         raise InputError("output", str(path), reason, remedy)
-
-
-def _among_devices(path: Path) -> bool:
-    """Whether a name belongs to the system: /dev/stdout is a link, at times to a file."""
-    return path.parent.resolve() == Path("/dev")
 
 
 def _is_marked(path: Path, mark: bytes) -> bool:

@@ -350,7 +350,6 @@ PositiveLength = Annotated[float, Quantity("m", above=0)]
 Mass = Annotated[float, Quantity("kg", above=0)]
 Inertia = Annotated[float, Quantity("kg*m**2", above=0)]
 Speed = Annotated[float, Quantity("m/s", above=0)]
-
 Angle = Annotated[float, Quantity("rad")]
 
 
