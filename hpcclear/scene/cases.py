@@ -53,7 +53,8 @@ class Goal(Table):
 
     def _check(self) -> None:
         if (self.statistic is None) == (self.formula is None):
-            raise invalid("a statistic or formula is needed here", 'Write statistic = "mean", say')
+            reason = "either a statistic or a formula is expected here"
+            raise invalid(reason, 'Write statistic = "mean", say')
         if self.formula is not None:
             with at("formula", self.formula[:80]):
                 names_in(self.formula)

@@ -101,7 +101,7 @@ def grid(lower: float, upper: float, step: float) -> tuple[float, ...]:
     """Values from `lower` on by `step`, up to `upper`; an error for validators if there are too few or too many."""
     count = int(np.floor((upper - lower) / step * (1 + 1e-12) + 1e-9)) + 1 if step > 0.0 else 0
     if not 2 <= count <= MOST:
-        raise invalid(f"gives {count} values; 2 to {MOST} are expected", "Correct it", "step")
+        raise invalid(f"gives {count} values, from 2 to {MOST} are expected", "Correct it", "step")
     return tuple(lower + step * k for k in range(count))
 
 
@@ -182,7 +182,7 @@ def _by_grades(given: Mapping[str, object], fits: Sequence[object]) -> list[floa
         total = 0.0
         for grade in grades.groups() if grades else ():
             if f"IT{grade}" not in given:
-                raise invalid(f"has no IT{grade} for {fit!r}", f"Add IT{grade} = ...", "cost")
+                raise invalid(f"has no cost of IT{grade} ({fit!r})", f"Add IT{grade} = ...", "cost")
             total += _converted([given[f"IT{grade}"]])[0]
         found.append(total)
     return found

@@ -316,8 +316,9 @@ class SceneTables(Table):
             if all(_alike(row.entries[path], value) for path, value in values.items()):
                 return float(k)
         listed = ", ".join(f"{path} = {value}" for path, value in values.items())
+        reason = "the value of the scene is not among its rows"
         remedy = "Write the values of one row into the scene: that is the baseline design"
-        raise InputError(f"study.variables.{name}", listed, "no row has the scene's value", remedy)
+        raise InputError(f"study.variables.{name}", listed, reason, remedy)
 
     def unit(self, path: str) -> str:
         """The SI unit of the physical number at a dotted path, "" for none; errors as `number`."""

@@ -156,7 +156,8 @@ class AlongLine(DryJoint):
         own = [name for name in entries if name in type(self).model_fields]
         given = [name for name in own if getattr(self, name) is not None]
         if self.clearance is None and given:
-            raise invalid("needs a clearance", 'Add clearance = "0.1 mm", or remove it', given[0])
+            reason = "belongs to a joint with clearance"
+            raise invalid(reason, 'Add clearance = "0.1 mm" or so, or remove it', given[0])
         for name in own if self.clearance is not None else ():
             if name in (*self.needed, "materials") and name not in given:
                 reason = "is missing, and a joint with clearance needs it"
