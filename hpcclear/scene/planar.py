@@ -31,7 +31,7 @@ class BarBending(Table):
 def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
     """An error for validators unless a body that bends is a bar that pins alone hold, at both its ends."""
     if body.length is None:
-        raise invalid("a body without length cannot bend", "Give its length, or leave bending out")
+        raise invalid("a body of no length cannot bend", "Give its length, or leave bending out")
     if body.points:
         further = f"the bar has a further point, {body.points[0].name}"
         reason = f"{further}, but bending is modelled for its two ends only"
@@ -51,9 +51,8 @@ def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
         ends = [point for own, _, point in places if own == body.name]
         held.update(ends)
         if ends and joint.kind in ("slide", "fixed"):
-            raise invalid(
-                f"{joint.name} guides it, but modes are of pinned ends", "Leave bending out"
-            )
+            reason = f"{joint.name} guides the bar, but the modes are those of pinned ends"
+            raise invalid(reason, "Leave bending out")
         if ends and getattr(joint, "out_of_round", None) is not None:
             reason = f"surfaces of {joint.name} are out of round, which needs rigid bodies"
             raise invalid(reason, "Leave out bending, or out_of_round")
