@@ -75,7 +75,7 @@ class LoadWriter(Acting):
         row = self._places.get(self._load)
         value = self._writer.table(self._load, len(rows), place, row)
         if row is not None:
-            self._writer.line(f"work[{row + at.MAX_CURVES} * W + i] = {self._writer.text(rate)}")
+            self._writer.store(row + at.MAX_CURVES, rate)
         return value
 
     def push(self, place: str, force: Vector) -> None:

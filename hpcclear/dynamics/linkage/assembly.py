@@ -28,13 +28,10 @@ SINGULAR = 1e-9  # smallest singular value, of rows scaled to 1, from which a po
 class Assembly:
     """A mechanism put together, or samples of one: then with a last axis (m,)."""
 
-    loops: Loops
-    """Its coordinates are those of `q` and `v`."""
-    q: Array
+    loops: Loops  # its coordinates are those of `q` and `v`
+    q: Array  # mass centres and angles of the bodies at the start, SI, (n,), and their velocities
     v: Array
-    """q and v, shape (n,): mass centres and angles of the bodies at the start, and their velocities, SI."""
-    steps: int
-    """Newton steps it took."""
+    steps: int  # Newton steps it took
 
     def angle(self, body: str) -> float:
         """Angle of a body at the start, rad."""

@@ -183,8 +183,7 @@ class Closing:
             # its angle does not restart with the period
             apart = self.writer.let(f"apart_{drive.name}", error)
             names = (f"s_{name}", f"c_{name}")
-            self.writer.when_needed(names, f"{', '.join(names)} = sincos({apart.name})")
-            error = named(f"s_{name}")
+            error, _ = self.writer.when_needed(f"sincos({apart.name})", *names)
         return self._row(
             f"{drive.name}_angle", {Mover("angle", own): ONE}, -turn, kin.spin(own) - spin, error
         )

@@ -6,7 +6,7 @@ A free linkage gets through these by its inertia: see `elements.held_inverse`.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-from hpcclear.base.terms import ONE, ZERO, Term, named
+from hpcclear.base.terms import ONE, ZERO, Term
 from hpcclear.dynamics.linkage.expression import Writer
 
 Matrix = dict[tuple[int, int], Term]
@@ -40,14 +40,9 @@ class Elimination:
     """
 
     def __init__(
-        self,
-        writer: Writer,
-        matrix: Matrix,
-        block: list[int],
-        held: int,
-        inverse: Callable[[Term], Term | None],
-        passed: Mapping[int, Sequence[int]] = {},
-    ) -> None:
+        self, writer: Writer, matrix: Matrix, block: list[int], held: int,
+        inverse: Callable[[Term], Term | None], passed: Mapping[int, Sequence[int]] = {},
+    ) -> None:  # fmt: skip
         self.writer = writer
         self.block = block
         self.inverse = inverse
@@ -109,10 +104,8 @@ class Elimination:
 
     def _inverse(self, pivot: int, diagonal: Term, scale: Term | None) -> Term:
         if scale is not None:
-            name = self.writer.fresh(f"inverse_{pivot}")
-            texts = ", ".join(self.writer.text(term) for term in (diagonal, scale))
-            self.writer.line(f"{name} = held_inverse({texts})")
-            return named(name)
+            (held,) = self.writer.call("held_inverse", (diagonal, scale), (f"inverse_{pivot}",))
+            return held
         known = self.inverse(diagonal)
         return self.writer.let(f"inverse_{pivot}", ONE / diagonal) if known is None else known
 

@@ -8,11 +8,10 @@ from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.expression import On, Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Contact, Drive, is_pin, split
-from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
 from hpcclear.dynamics.linkage.trees import forest
 
@@ -93,9 +92,9 @@ class MotionEquations:
 
     def turned(self, name: str) -> Term:
         """What the curve of a drive or load says at the stage."""
-        turned = f"turned_{name.replace('.', '_')}"
-        self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
-        return named(turned)
+        row, word = self.rows.curves[name], f"turned_{name.replace('.', '_')}"
+        (turned,) = self.writer.when_needed(f"work[{row} * W + i]", word)
+        return turned
 
     def torque(self, drive: Drive) -> tuple[Mover, Term]:
         """What a drive exerts, and along which column."""
@@ -157,16 +156,14 @@ class MotionEquations:
             r = k - len(self.columns)
             value = self.writer.let(f"hold_{self.constraints[r].name}", term)
             if self.rows.holds is not None:
-                text = self.writer.text(value)
-                self.writer.line(f"work[{self.rows.holds + r} * W + i] = {text}")
+                self.writer.store(self.rows.holds + r, value)
             return value
         name = self.forest.coordinates[k].name
         value = self.writer.let(f"a_{name}", term, whole=True)
-        row = self.rows.accelerations + k
         written = value
         if self.columns[k].kind == "y" and self.columns[k].body in self.balance.falling:
             written = value - self.writer.parameter("gravity")
-        self.writer.line(f"work[{row} * W + i] = {self.writer.text(written)}")
+        self.writer.store(self.rows.accelerations + k, written)
         return value
 
     def _block(
@@ -196,18 +193,10 @@ class MotionEquations:
         """
         if not self.mechanism.free:
             return {}
-        n = len(self.columns)
-        pins: dict[str, tuple[str, str]] = {}
-        for one in self.forest.closures:
-            if is_pin(one):
-                names = (f"{one.name}_x", f"{one.name}_y")
-                pins |= dict.fromkeys(names, names)
-        numbers = {row.name: r for r, row in enumerate(self.constraints, n)}
-        return {
-            numbers[name]: [numbers[one] for one in both]
-            for name, both in pins.items()
-            if numbers[name] in block
-        }
+        numbers = {row.name: r for r, row in enumerate(self.constraints, len(self.columns))}
+        pins = [one.name for one in self.forest.closures if is_pin(one)]
+        pairs = [[numbers[f"{name}_{axis}"] for axis in "xy"] for name in pins]
+        return {r: both for both in pairs for r in both if r in block}
 
     def reaction(self, column: Mover, found: dict[int, Term]) -> Term:
         """What has to act along a column that is prescribed."""

@@ -1,14 +1,55 @@
 """Arithmetic that writes itself down: terms of names and numbers, and the text that computes them, statement by statement.
 
 Zeros disappear, signs move outwards, and nothing else is rearranged: the text adds and multiplies in the order
-in which the generator did, which decides the last bits. Names are read where they are first needed.
+in which the generator did, which decides the last bits. Names are read where they are first needed. `On` and `Rows` say what a
+text has in it, and where it finds and leaves its numbers.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.terms import Term, named
 from hpcclear.dynamics import layout as at
+
+
+class On(NamedTuple):
+    """Which effects and outputs a text has, besides the mechanism's own loads and drives."""
+
+    friction: bool = False  # in the joints with clearance: of contact or of a film
+    gravity: bool = False
+    energies: bool = False  # energy balance
+    series: bool = False  # drive moment, for time series
+    responses: bool = False  # drive moment and what is followed
+    impacts: bool = False  # force on the frame
+    pins: bool = False  # forces of ideal pins
+    follow: str = ""  # a guided body, or body.point
+    objective: str = ""  # its rate: "joints", or "whole" of the mechanism
+    waves: bool = False  # surfaces of the joints with clearance are out of round
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Where a text finds and leaves its numbers: first rows of `work`, rows of parameters, first row that is free."""
+
+    coordinates: int = at.QS
+    velocities: int = at.VS
+    accelerations: int = at.ACC
+    rates: int = at.RATE_NOW
+    time: int = at.STAGE_TIME
+    holds: int | None = None  # first of the multipliers, where they are asked for
+    parameters: Mapping[str, int] = field(default_factory=dict)
+    free: int = 0
+    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
+    # on straight tables; rates MAX_CURVES behind
+    places: Mapping[str, int] = field(default_factory=dict)
+
+    def behind(self, bristles: int) -> "Rows":
+        """The same of a motion whose coordinates come after so many of bristles."""
+        moved = ("coordinates", "velocities", "accelerations")
+        return replace(self, **{name: getattr(self, name) + bristles for name in moved})
+
 
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
 
@@ -49,11 +90,12 @@ class Writer:
         """A parameter of the sample."""
         return named(name, fixed=True)
 
-    def when_needed(self, names: tuple[str, ...], line: str, needs: tuple[Term, ...] = ()) -> None:
-        """A statement that defines `names`, written down before the first that uses one of them."""
+    def when_needed(self, text: str, *names: str, needs: tuple[Term, ...] = ()) -> tuple[Term, ...]:
+        """Names whose statement is written down before the first that uses one of them."""
         for name in names:
-            self._pending[name] = (names, line, needs)
+            self._pending[name] = (names, f"{', '.join(names)} = {text}", needs)
             self._taken.add(name)
+        return tuple(map(named, names))
 
     def let(self, name: str, term: Term, *, whole: bool = False) -> Term:
         """Give a term a name, unless it has one (or is zero, or one) or its text is known already.
@@ -86,13 +128,18 @@ class Writer:
         return name
 
     def call(
-        self, function: Callable[..., object], terms: Iterable[Term], results: Iterable[str]
+        self, function: Callable[..., object] | str, terms: Iterable[Term], results: Iterable[str]
     ) -> tuple[Term, ...]:
-        """A statement that calls a function; what it returns, by names like these."""
+        """A statement that calls a function, one of `elements` by its name; what it returns, by names like these."""
         texts = [self.text(term) for term in terms]
         made = [self.fresh(name) for name in results]
-        self.line(f"{', '.join(made)} = {self.called(function)}({', '.join(texts)})")
+        known = function if isinstance(function, str) else self.called(function)
+        self.line(f"{', '.join(made)} = {known}({', '.join(texts)})")
         return tuple(map(named, made))
+
+    def store(self, row: int, term: Term) -> None:
+        """A statement that leaves a value in a row of the lanes."""
+        self.line(f"work[{row} * W + i] = {self.text(term)}")
 
     def table(self, name: str, count: int, where: Term, row: int | None) -> Term:
         """The value at a place of a table of so many rows that runs straight from row to row and stays level beyond.
@@ -104,7 +151,7 @@ class Writer:
         total = self.parameter(f"{name}_first")
         place = self.let(f"at_{name}", where, whole=True)
         if row is not None:
-            self.line(f"work[{row} * W + i] = {self.text(place)}")
+            self.store(row, place)
         for k in range(count):
             start, bend = (self.parameter(f"{name}_{entry}_{k}") for entry in ("start", "bend"))
             total = total + self.hinge(f"{name}_{k}", place, start, bend)
@@ -112,10 +159,8 @@ class Writer:
 
     def hinge(self, name: str, place: Term, start: Term, bend: Term) -> Term:
         """A line of slope `bend` beyond `start`, 0 before."""
-        texts = [self.text(one) for one in (place, start, bend)]
-        made = self.fresh(name)
-        self.line(f"{made} = hinge({', '.join(texts)})")
-        return named(made)
+        (made,) = self.call("hinge", (place, start, bend), (name,))
+        return made
 
     def line(self, text: str) -> None:
         """A statement as it stands; its names must have been written already (see `text`)."""

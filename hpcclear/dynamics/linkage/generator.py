@@ -14,11 +14,10 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.acting import LoadWriter
 from hpcclear.dynamics.linkage.closing import dot
 from hpcclear.dynamics.linkage.equations import MotionEquations
-from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.expression import On, Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import Drive, Joint, TableRow, split
-from hpcclear.dynamics.linkage.rows import On, Rows
 from hpcclear.dynamics.linkage.rubbing import RubbingPin
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -94,23 +93,19 @@ def _by_time(seconds: float) -> LookUp:
 class Motion:
     """A text and what it needs."""
 
-    source: str
-    """Of the function ``lane(effects, joints, work, par, i, W)``."""
+    source: str  # of the function ``lane(effects, joints, work, par, i, W)``
     forest: Forest
-    parameters: dict[str, int]
-    """Rows of `par` by name."""
-    derived: dict[str, str]
-    """Texts of the derived parameters, by name, in parameters of `inputs`."""
-    inputs: tuple[str, ...]
-    """Names that `numbers.values` gives a number to."""
-    constraints: tuple[str, ...]
-    """Names of the multipliers."""
-    curves: Mapping[str, int] = field(default_factory=dict)
-    """Rows of tabulated values, by drive or load."""
+    parameters: dict[str, int]  # rows of `par` by name
+    derived: dict[str, str]  # texts of the derived parameters, by name, in parameters of `inputs`
+    inputs: tuple[str, ...]  # names that `numbers.values` gives a number to
+    constraints: tuple[str, ...]  # names of the multipliers
+    curves: Mapping[str, int] = field(
+        default_factory=dict
+    )  # rows of tabulated values, by drive or load
+    # where each is looked up; those that move bodies first, since the angle of loads may be theirs
     look_ups: Mapping[str, LookUp] = field(default_factory=dict)
-    """Where each of them is looked up; those that move bodies first, since the angle of loads may be theirs."""
+    # of loads by name, ordinary Python, that the text calls besides those of `elements`
     functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
-    """Functions of loads by name, ordinary Python, that the text calls besides those of `elements`."""
 
 
 def generate(
@@ -180,7 +175,7 @@ class _Generator(MotionEquations):
                 if name in self.rows.places:
                     angle = self.number[Mover("angle", self.forest.frames[drive.body])]
                     row = self.rows.places[name] + at.MAX_CURVES
-                    write.line(f"work[{row} * W + i] = {write.text(found[angle])}")
+                    write.store(row, found[angle])
         if on.energies or on.series or on.responses or on.objective or on.pins:
             for rub in self.late:
                 rub.measure()
@@ -215,9 +210,8 @@ class _Generator(MotionEquations):
             pin = RubbingPin(joint, self)
             on_bearing = pin.body is not None and pin.body != split(joint.journal)[0]
             for axis, part in enumerate(pin.pushes(found)):
-                force = self.writer.text(-part if on_bearing else part)
                 row = at.PINS + axis * at.MAX_PINS + k
-                self.writer.line(f"work[{row} * W + i] = {force}")
+                self.writer.store(row, -part if on_bearing else part)
 
     def _objective(self) -> None:
         """Calls of the objective's rate, which reads the rates that were written before."""
@@ -301,8 +295,7 @@ class _Generator(MotionEquations):
         return self.writer.let("moment", self.reaction(column, found), whole=True)
 
     def _rate(self, row: int, term: Term) -> None:
-        text = self.writer.text(term)
-        self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
+        self.writer.store(self.rows.rates + row, term)
 
 
 def guide_of(mechanism: Mechanism, body: str) -> Joint:

@@ -61,10 +61,9 @@ class Kinematics:
         self._spins: dict[str, Term] = {}
         self._accelerations: dict[str, Term] = {}
         for k, one in enumerate(forest.coordinates):
-            read = "{} = work[{} * W + i]"
-            for name, row in ((one.name, coordinates + k), (self.speed_name(one), velocities + k)):
-                writer.when_needed((name,), read.format(name, row))
-        writer.when_needed(("time",), f"time = work[{time} * W + i]")
+            writer.when_needed(f"work[{coordinates + k} * W + i]", one.name)
+            writer.when_needed(f"work[{velocities + k} * W + i]", self.speed_name(one))
+        writer.when_needed(f"work[{time} * W + i]", "time")
         for frame in dict.fromkeys(forest.frames.values()):
             if frame != GROUND:
                 self._turn(frame)
@@ -89,7 +88,7 @@ class Kinematics:
             angle, spin, acceleration = self.driven(drive, frame)
             self._spins[frame], self._accelerations[frame] = spin, acceleration
         names = (f"s_{frame}", f"c_{frame}")
-        self.writer.when_needed(names, f"{', '.join(names)} = sincos(angle_{frame})", (angle,))
+        self.writer.when_needed(f"sincos(angle_{frame})", *names, needs=(angle,))
 
     def driven(self, drive: Drive, frame: str) -> tuple[Term, Term, Term]:
         """Angle, angular velocity and acceleration that a drive prescribes."""
@@ -104,34 +103,30 @@ class Kinematics:
             needs: tuple[Term, ...] = (speed, time)
             if started:
                 text, needs = f"{frame}_start + {text}", (started, speed, time)
-            write.when_needed((name,), f"{name} = {text}", needs)
-            return named(name), speed, ZERO
+            (angle,) = write.when_needed(text, name, needs=needs)
+            return angle, speed, ZERO
         if drive.kind == "table":
             return self._tabulated(drive, frame)
         assert drive.kind == "harmonic"
-        spin, acceleration, phase = f"spin_{frame}", f"turn_{frame}", f"phase_{frame}"
-        mean, amplitude, rate, shift = (
-            write.parameter(f"{drive.name}_{entry}")
-            for entry in ("mean", "amplitude", "rate", "phase")
-        )
-        line = f"s_{phase}, c_{phase} = sincos({rate.name} * time + {shift.name})"
-        write.when_needed((f"s_{phase}", f"c_{phase}"), line, (rate, time, shift))
-        given = f"{mean.name}, {amplitude.name}, {rate.name}, s_{phase}, c_{phase}"
-        line = f"{name}, {spin}, {acceleration} = harmonic({given})"
-        needs = (mean, amplitude, rate, named(f"s_{phase}"))
-        write.when_needed((name, spin, acceleration), line, needs)
-        return named(name), named(spin), named(acceleration)
+        entries = ("mean", "amplitude", "rate", "phase")
+        mean, amplitude, rate, shift = (write.parameter(f"{drive.name}_{e}") for e in entries)
+        phase = f"{rate.name} * time + {shift.name}"
+        names = (f"s_phase_{frame}", f"c_phase_{frame}")
+        sine, cosine = write.when_needed(f"sincos({phase})", *names, needs=(rate, time, shift))
+        given = ", ".join(one.name for one in (mean, amplitude, rate, sine, cosine))
+        needs, found = (mean, amplitude, rate, sine), (name, f"spin_{frame}", f"turn_{frame}")
+        angle, spin, turn = write.when_needed(f"harmonic({given})", *found, needs=needs)
+        return angle, spin, turn
 
     def _tabulated(self, drive: Drive, frame: str) -> tuple[Term, Term, Term]:
         write, time = self.writer, named("time")
         parts = [f"{part}_{drive.name}" for part in ("given_angle", "given_spin", "given_turn")]
         rows = [self._curves.get(f"{drive.name}.{part}") for part in ("angle", "spin", "turn")]
         if None in rows:
-            line = f"{', '.join(parts)} = table_of_{drive.name}(time)"
-            write.when_needed(tuple(parts), line, (time,))
+            write.when_needed(f"table_of_{drive.name}(time)", *parts, needs=(time,))
         else:
             for part, row in zip(parts, rows, strict=True):
-                write.when_needed((part,), f"{part} = work[{row} * W + i]")
+                write.when_needed(f"work[{row} * W + i]", part)
         angle, spin, turn = map(named, parts)
         gained = self._number(f"{drive.name}_rate", drive.advance)
         shift = self._number(f"{drive.name}_shift", self.forest.offsets[drive.body])
@@ -140,8 +135,8 @@ class Kinematics:
             text, needs = f"{text} + {gained.name} * time", [*needs, gained, time]
         if shift:
             text, needs = f"{text} - {shift.name}", [*needs, shift]
-        write.when_needed((name,), f"{name} = {text}", tuple(needs))
-        return named(name), spin + gained, turn
+        (angle,) = write.when_needed(text, name, needs=tuple(needs))
+        return angle, spin + gained, turn
 
     def angle(self, body: str) -> Term:
         """Angle of a body that turns, from the x axis."""
@@ -237,10 +232,8 @@ class Kinematics:
             return Point({GROUND: fixed} if any(fixed) else {}, ())
         hang, frame = forest.hangs[body], forest.frames[body]
         if hang.joint is None:
-            moves = tuple(
-                Move(kind, body, GROUND, direction)
-                for kind, direction in (("x", Vector(ONE, ZERO)), ("y", Vector(ZERO, ONE)))
-            )
+            axes = {"x": Vector(ONE, ZERO), "y": Vector(ZERO, ONE)}
+            moves = tuple(Move(kind, body, GROUND, along) for kind, along in axes.items())
             root = Point({GROUND: Vector(named(f"x_{body}"), named(f"y_{body}"))}, moves)
             return self._reached(root, frame, body, (CENTER, point))
         parent = self.point(hang.parent)

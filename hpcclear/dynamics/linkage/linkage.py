@@ -10,13 +10,13 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
-from hpcclear.dynamics.linkage.generator import Motion, On, curves_of, generate
+from hpcclear.dynamics.linkage.expression import On, Rows
+from hpcclear.dynamics.linkage.generator import Motion, curves_of, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import Number
 from hpcclear.dynamics.linkage.poses import Pose, Poses
-from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
@@ -41,15 +41,9 @@ class Linkage:
         self._whole = self._text(_with_impacts(self._on)._replace(pins=True))
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
-        masses = [
-            f"{body.name}_{part}" for body in mechanism.bodies for part in ("mass", "inertia")
-        ]
-        masses += [
-            f"{body.name}_bend_{entry}"
-            for body in mechanism.bodies
-            if body.bending is not None
-            for entry in entries(body.bending.modes)
-        ]
+        bars = [body for body in mechanism.bodies if body.bending is not None]
+        masses = [f"{b.name}_{part}" for b in mechanism.bodies for part in ("mass", "inertia")]
+        masses += [f"{b.name}_bend_{part}" for b in bars for part in entries(b.bending.modes)]
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
@@ -67,9 +61,8 @@ class Linkage:
         if on not in self._texts:
             first = at.RATE_NOW + at.PLACES + len(self.curve_rows)
             places = {name: first + k for k, name in enumerate(self.straight)}
-            rows = Rows(
-                parameters=self._given, free=self._free, curves=self.curve_rows, places=places
-            )
+            given, free, curves = self._given, self._free, self.curve_rows
+            rows = Rows(parameters=given, free=free, curves=curves, places=places)
             rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
             self._texts[on] = text
@@ -105,11 +98,8 @@ class Linkage:
     @cached_property
     def curve_rows(self) -> dict[str, int]:
         """Rows of tabulated values at the stage, by drive or load; raises InputError if there are too many."""
-        tabled = [
-            name
-            for one in (*self.mechanism.drives, *self.mechanism.loads)
-            for name in curves_of(one)
-        ]
+        parts = (*self.mechanism.drives, *self.mechanism.loads)
+        tabled = [name for one in parts for name in curves_of(one)]
         count = len(tabled) + len(self.straight)
         if count > at.MAX_CURVES:
             reason = f"more than {at.MAX_CURVES} tabulated curves"
@@ -120,11 +110,8 @@ class Linkage:
     def straight(self) -> dict[str, list[str]]:
         """Tables that run straight from row to row, and the parameters that say where they bend."""
         parts = (*self.mechanism.drives, *self.mechanism.loads)
-        return {
-            name: [f"{name}_start_{k}" for k in range(len(rows))]
-            for one in parts
-            for name, rows in one.straight.items()
-        }
+        tables = {name: len(rows) for one in parts for name, rows in one.straight.items()}
+        return {name: [f"{name}_start_{k}" for k in range(n)] for name, n in tables.items()}
 
     @property
     def bends(self) -> list[list[int]]:
@@ -160,10 +147,9 @@ class Linkage:
         """
         pose, eccentricity = self.poses.at(par, q, v, time)
         bodies = self.mechanism.bodies
-        mass, inertia = (
-            par.T[[self._given[f"{b.name}_{part}"] for b in bodies]].reshape(len(bodies), -1)
-            for part in ("mass", "inertia")
-        )
+        names = [[f"{b.name}_{part}" for b in bodies] for part in ("mass", "inertia")]
+        rows = (par.T[[self._given[name] for name in part]] for part in names)
+        mass, inertia = (part.reshape(len(bodies), -1) for part in rows)
         kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
         potential = gravity * (mass * pose.y).sum(axis=0)
         for k, found in self.bent(par, q, v, pose).items():
@@ -179,9 +165,8 @@ class Linkage:
                 continue
             modes = body.bending.modes
             first = self.forest.index(kind_of(1), body.name) or 0
-            found = {
-                name: par.T[self._given[f"{body.name}_bend_{name}"]] for name in entries(modes)
-            }
+            own = f"{body.name}_bend_"
+            found = {name: par.T[self._given[own + name]] for name in entries(modes)}
             cosine, sine = np.cos(pose.angle[k]), np.sin(pose.angle[k])
             along = cosine * pose.vx[k] + sine * pose.vy[k]
             across = cosine * pose.vy[k] - sine * pose.vx[k]

@@ -3,9 +3,9 @@
 The terms are those of `closing.Closing`, evaluated by Python or, for many instants at once, by numpy.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Number, is_joint
+from hpcclear.dynamics.linkage.parts import Number, Pair, is_joint
 from hpcclear.dynamics.linkage.trees import forest
 
 WORDS: dict[str, Callable[..., object]] = elements.functions() | {
@@ -52,11 +52,8 @@ def of_terms(
 def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], list[Array]]]:
     """What texts for numpy call for each table of angles: ``table_of_NAME(time)``, its `curves` at times of any shape, from
     the same pieces that the kernel reads."""
-    return {
-        f"table_of_{drive.name}": partial(_all_at, drive.pieces)
-        for drive in mechanism.drives
-        if drive.kind == "table"
-    }
+    tables = (drive for drive in mechanism.drives if drive.kind == "table")
+    return {f"table_of_{drive.name}": partial(_all_at, drive.pieces) for drive in tables}
 
 
 def _all_at(pieces: tuple[Pieces, ...], time: Array) -> list[Array]:
@@ -133,10 +130,13 @@ class Loops:
 
 def typical_length(mechanism: Mechanism) -> Number:
     """The largest distance between points of a body, or of the ground, m; of samples, (m,)."""
-    groups = [list(mechanism.ground.values())]
-    groups += [[*body.points.values(), body.center] for body in mechanism.bodies]
+    bodies = ([*body.points.values(), body.center] for body in mechanism.bodies)
+    return largest_distance([*mechanism.ground.values()], *bodies)[()]
+
+
+def largest_distance(*groups: Sequence[Pair]) -> Array:
+    """The largest between points of one of the groups, m; of samples, (m,); 1 where all are in one place."""
     largest: Number = 0.0
-    for points in groups:
-        for a, b in combinations(points, 2):
-            largest = np.maximum(largest, np.hypot(a[0] - b[0], a[1] - b[1]))
-    return np.where(largest > 0.0, largest, 1.0)[()]
+    for a, b in chain.from_iterable(combinations(points, 2) for points in groups):
+        largest = np.maximum(largest, np.hypot(a[0] - b[0], a[1] - b[1]))
+    return np.where(largest > 0.0, largest, 1.0)

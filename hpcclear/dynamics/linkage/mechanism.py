@@ -47,11 +47,8 @@ class Mechanism:
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Their contacts, joint by joint."""
-        return tuple(
-            Contact(part, joint, *places)
-            for joint in self.clearances
-            for part, places in joint.contacts().items()
-        )
+        each = ((joint, joint.contacts().items()) for joint in self.clearances)
+        return tuple(Contact(part, joint, *at) for joint, items in each for part, at in items)
 
     @property
     def ideal(self) -> tuple[Joint, ...]:
@@ -251,13 +248,18 @@ def _numbers(m: Mechanism) -> None:
             )  # fmt: skip
 
 
+def massless(m: Mechanism) -> set[str]:
+    """Names of bodies without inertia or a flywheel."""
+    flywheels = {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
+    return {body.name for body in m.bodies if body.inertia == 0.0} - flywheels
+
+
 def massless_angles(m: Mechanism) -> set[str]:
     """Names of bodies without inertia that may turn while no mass moves, so that the mass matrix is singular.
 
     An ideal pin off the mass centre, or a guide, to a body that cannot makes it regular.
     """
-    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m)
-    found -= {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
+    found = massless(m) & turning(m)
     left = len(m.bodies) + 1
     while len(found) < left:
         left = len(found)

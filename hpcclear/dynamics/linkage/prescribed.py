@@ -16,7 +16,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, coordinates, placed
-from hpcclear.dynamics.linkage.generator import On, generate
+from hpcclear.dynamics.linkage.expression import On, Rows
+from hpcclear.dynamics.linkage.generator import generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
@@ -24,7 +25,6 @@ from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses
-from hpcclear.dynamics.linkage.rows import Rows
 
 Curves = Mapping[str, Callable[[Array], Array]]
 """Tabulated loads by name, each as a function of the angle (t,), rad, or time (t,), s, that it goes by."""
@@ -39,22 +39,18 @@ class Prescribed:
     """A motion that the drives prescribe, over instants (t,)."""
 
     assembly: Assembly
-    times: Array
-    """Shape (t,)."""
+    times: Array  # (t,)
+    # mass centres and angles of all bodies, velocities and accelerations, SI, (t, n), in the order of ``assembly.loops.forest``
     q: Array
     v: Array
     a: Array
-    """q, v and a, shape (t, n): mass centres and angles of all bodies, velocities and accelerations, SI; the order of
-    ``assembly.loops.forest``."""
+    # by constraint: ``"NAME_x"`` and ``"NAME_y"`` are the force of a pin on its journal's body, ``"NAME_across"`` that of a
+    # guide across its line, ``"NAME_angle"`` the moment of a guide or of a drive; each (t,), N or N m
     holds: dict[str, Array]
-    """By constraint: ``"NAME_x"`` and ``"NAME_y"`` are the force of a pin on its journal's body, ``"NAME_across"`` that of
-    a guide across its line, ``"NAME_angle"`` the moment of a guide or of a drive; each (t,), N or N m."""
-    power: Array
+    power: Array  # of all drives, of friction, of the loads, W, (t,)
     loss: Array
     load_power: Array
-    """power, loss and load_power, shape (t,): of all drives, of friction, of the loads, W."""
-    margin: Array
-    """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
+    margin: Array  # smallest singular value of the constraints, rows scaled to 1, (t,): 0 at a dead centre
 
     def at(self, times: Array, values_of: Callable[[Array], Array]) -> "Prescribed":
         """The same at other instants: what makes values there of these, the instants first."""
@@ -148,30 +144,21 @@ def why(assembly: Assembly, passage: Passage) -> str:
     }
     driven = {drive.body for drive in mechanism.drives} | {GROUND}
     loaded = [j for j in mechanism.joints if held[j.name] > 0.05 * max(held.values())]
-    bodies = [
-        body.name
-        for body in mechanism.bodies
-        if body.name not in driven
-        and sum(body.name in map(_body, places_of(joint)) for joint in loaded) > 1
-    ]
-    between = [j for j in loaded if set(bodies) & set(map(_body, places_of(j)))]
+    ends = [{split(place)[0] for place in places_of(joint)} for joint in loaded]
+    names = [body.name for body in mechanism.bodies if body.name not in driven]
+    bodies = [name for name in names if sum(name in both for both in ends) > 1]
+    between = [joint for joint, both in zip(loaded, ends, strict=True) if both & {*bodies}]
     points = np.array([[(z := placed(pose, places_of(j)[0])[0]).real, z.imag] for j in between])
     spread = np.linalg.svd(points - points.mean(axis=0))[1] if len(points) else np.ones(2)
-    straight = len(spread) > 1 and spread[1] < 0.02 * spread[0]
+    straight = len(spread) > 1 and spread[1] < 0.02 * spread[0] and len(bodies) > 1
     where = f"{angle_of(pose):.1f} deg of the {mechanism.period.body}"
-    names = " and ".join([", ".join(bodies[:-1]), bodies[-1]] if len(bodies) > 1 else bodies)
-    state = (
-        f"{names} {'in line' if straight and len(bodies) > 1 else 'jammed'}" if bodies else "jammed"
-    )
+    listed = " and ".join([", ".join(bodies[:-1]), bodies[-1]] if len(bodies) > 1 else bodies)
+    state = f"{listed} {'in line' if straight else 'jammed'}" if bodies else "jammed"
     joints = ", ".join(joint.name for joint in between)
     state += f" (joints {joints})" if joints else ""
     if status is Status.CANNOT_TURN:
         return f"cannot turn: locks at {where}, {state}"
     return f"near singular: at {where}, {state}, its motion or its forces are not determined"
-
-
-def _body(place: str) -> str:
-    return split(place)[0]
 
 
 def cartesian(assembly: Assembly, passage: Passage, q: Array, v: Array, times: Array) -> Array:

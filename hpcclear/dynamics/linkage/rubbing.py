@@ -76,11 +76,9 @@ class Rubbing:
         """Write down friction over reaction, signed like the sliding speed."""
         write, name = self.writer, self.joint.name
         ramp = write.parameter(f"{name}_inverse_ramp")
-        speed = write.text(self.speed * ramp)
-        saturated = write.fresh(f"ramp_{name}")
-        write.line(f"{saturated} = saturated({speed})")
+        (saturated,) = write.call("saturated", (self.speed * ramp,), (f"ramp_{name}",))
         coefficient = write.parameter(f"{name}_coefficient")
-        self.ratio = write.let(f"ratio_{name}", coefficient * named(saturated))
+        self.ratio = write.let(f"ratio_{name}", coefficient * saturated)
 
     def pushes(self, found: dict[int, Term]) -> list[Term]:
         """Components of the reaction where unknowns are these."""
@@ -123,10 +121,7 @@ class RubbingGuide(Rubbing):
 
     def directed(self, parts: list[Term]) -> list[Term]:
         """A sign."""
-        write = self.writer
-        flip = write.fresh(f"flip_{self.joint.name}")
-        write.line(f"{flip} = sign_of({write.text(parts[0])})")
-        return [named(flip)]
+        return [*self.writer.call("sign_of", parts[:1], (f"flip_{self.joint.name}",))]
 
     def paired(self, block: list[int], matrix: Matrix, right: dict[int, Term]) -> dict[int, Term]:
         """A slider and one other coordinate: solved for N > 0, and for N < 0 where that sign does not hold."""
@@ -147,9 +142,8 @@ class RubbingGuide(Rubbing):
 
         _, determinant, given = equations(self.ratio)
         other = write.let("guess", (first * c - b * given) / determinant)
-        flip = write.fresh("flip")
-        write.line(f"{flip} = sign_of({write.text(rest + slope * other)})")
-        ratio = write.let("ratio", self.ratio * named(flip))
+        (flip,) = write.call("sign_of", (rest + slope * other,), ("flip",))
+        ratio = write.let("ratio", self.ratio * flip)
         coupled, determinant, given = equations(ratio)
         other = write.let(f"z_{o}", (first * c - b * given) / determinant)
         slider = write.let(f"z_{s}", (a * given - coupled * first) / determinant)
@@ -197,18 +191,13 @@ class RubbingPin(Rubbing):
         for pull in balance.pulls:
             if split(pull.place)[0] in self.beyond:
                 rest = rest - pull.force
-        slopes |= {
-            self.rows[name]: direction
-            for closure in kin.forest.closures
-            for name, direction in self._held(closure)
-        }
-        return [
-            (
-                self.writer.let(f"rest_{self.joint.name}", getattr(rest, axis)),
-                {k: part for k, v in slopes.items() if (part := getattr(v, axis))},
-            )
-            for axis in "xy"
-        ]
+        taken = (pair for closure in kin.forest.closures for pair in self._held(closure))
+        slopes |= {self.rows[name]: direction for name, direction in taken}
+        found = []
+        for axis in "xy":
+            own = self.writer.let(f"rest_{self.joint.name}", getattr(rest, axis))
+            found.append((own, {k: part for k, v in slopes.items() if (part := getattr(v, axis))}))
+        return found
 
     def _held(self, closure: Joint) -> list[tuple[str, Vector]]:
         """By constraint of a joint that closes a loop: the force that it takes off what is beyond."""
@@ -226,11 +215,8 @@ class RubbingPin(Rubbing):
 
     def directed(self, parts: list[Term]) -> list[Term]:
         """A unit vector."""
-        write = self.writer
-        made = [write.fresh(f"{part}_{self.joint.name}") for part in ("ux", "uy")]
-        texts = ", ".join(write.text(part) for part in parts)
-        write.line(f"{', '.join(made)} = unit_vector({texts})")
-        return [named(one) for one in made]
+        names = (f"{part}_{self.joint.name}" for part in ("ux", "uy"))
+        return [*self.writer.call("unit_vector", parts, names)]
 
 
 def rubbing_of(of: Solving) -> list[Rubbing]:

@@ -42,20 +42,14 @@ class Forest:
     """Trees, coordinates and frames of a mechanism."""
 
     mechanism: Mechanism
-    hangs: dict[str, Hang]
-    """How each body hangs, parents before children."""
-    frames: dict[str, str]
-    """Which body's angle each body has, or the ground's."""
-    offsets: dict[str, float]
-    """By how much each body is turned against its frame, rad."""
+    hangs: dict[str, Hang]  # how each body hangs, parents before children
+    frames: dict[str, str]  # which body's angle each body has, or the ground's
+    offsets: dict[str, float]  # by how much each body is turned against its frame, rad
+    # modes of bending first, then in the bodies' order; last the angle of the body that the period's drive turns
     coordinates: tuple[Coordinate, ...]
-    """Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last."""
-    prescribed: dict[str, Drive]
-    """Drives by frame, where the angle is given."""
-    closures: tuple[TableRow, ...]
-    """What is left as a constraint."""
-    cartesian: bool = False
-    """Whether every body is a tree by itself."""
+    prescribed: dict[str, Drive]  # drives by frame, where the angle is given
+    closures: tuple[TableRow, ...]  # what is left as a constraint
+    cartesian: bool = False  # whether every body is a tree by itself
 
     def index(self, kind: str, body: str) -> int | None:
         """Which coordinate it is, if it is one; of several modes the first."""
@@ -89,7 +83,7 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
         edges = [joint for joint in closures if joint.kind == "fixed"]
         closures = [joint for joint in closures if joint.kind != "fixed"]
     hangs = _hung(mechanism, edges)
-    frames, offsets = _frames(mechanism, hangs)
+    frames, offsets = _frames(hangs)
     prescribed = {frames[d.body]: d for d in mechanism.drives if d.prescribed and not cartesian}
     ends = [d for d in mechanism.drives if d.prescribed or closed] if cartesian else []
     return Forest(
@@ -138,7 +132,7 @@ def _hung(m: Mechanism, edges: list[Joint]) -> dict[str, Hang]:
     return hangs
 
 
-def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[str, float]]:
+def _frames(hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[str, float]]:
     """Whose angle each body has, and by how much it is turned against that frame, rad."""
     frames, offsets = {GROUND: GROUND}, {GROUND: 0.0}
     for body, hang in hangs.items():
@@ -154,12 +148,8 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
 def _coordinates(
     m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, Drive]
 ) -> tuple[Coordinate, ...]:
-    found = [
-        Coordinate(kind_of(mode), body.name)
-        for body in m.bodies
-        if body.bending is not None
-        for mode in range(1, body.bending.modes + 1)
-    ]
+    bars = ((body.name, body.bending.modes) for body in m.bodies if body.bending is not None)
+    found = [Coordinate(kind_of(k), name) for name, modes in bars for k in range(1, modes + 1)]
     for body in m.bodies:
         joint = hangs[body.name].joint
         if joint is None:

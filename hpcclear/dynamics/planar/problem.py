@@ -1,8 +1,7 @@
 """A scene's linkage as the kernel takes it: its texts and rows, parameters and starts of its samples."""
 
 from dataclasses import replace
-from functools import lru_cache, reduce
-from itertools import combinations
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,11 +11,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
+from hpcclear.dynamics.linkage.expression import On
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
+from hpcclear.dynamics.linkage.loops import largest_distance
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, massless, turning
 from hpcclear.dynamics.linkage.parts import GROUND, Number, split
-from hpcclear.dynamics.linkage.rows import On
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import Walk, changes, passage, refused
@@ -102,11 +102,8 @@ def _check_room(scene: Scene, others: int) -> None:
 
 def guided(mechanism: Mechanism) -> str:
     """The first body that a guide on the ground holds: what stands for the slider; "" for none."""
-    held = [
-        split(joint.point)[0]
-        for joint in mechanism.joints
-        if joint.kind == "slide" and split(joint.line)[0] == GROUND
-    ]
+    slides = (joint for joint in mechanism.joints if joint.kind == "slide")
+    held = [split(joint.point)[0] for joint in slides if split(joint.line)[0] == GROUND]
     return next((body.name for body in mechanism.bodies if body.name in held), "")
 
 
@@ -126,10 +123,7 @@ def check_drives(mechanism: Mechanism) -> None:
 
 def check_inertias(m: Mechanism) -> None:
     """InputError where a body by itself would need an inertia that it does not have: its angle does not grow evenly."""
-    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(
-        m, ("constant-speed",)
-    )
-    found -= {drive.body for drive in m.drives if getattr(drive, "flywheel_inertia", 0.0)}
+    found = massless(m) & turning(m, ("constant-speed",))
     for body in m.bodies:
         if body.name in found:
             raise InputError(
@@ -225,10 +219,7 @@ def driven_length(mechanism: Mechanism) -> Array:
     """The largest distance between points of the body that gives the period, m, of samples (m,): how fast the mechanism is
     goes by it."""
     body = mechanism.body(mechanism.period.body)
-    places = [*body.points.values(), body.center]
-    apart = (np.hypot(a[0] - b[0], a[1] - b[1]) for a, b in combinations(places, 2))
-    longest: Number = reduce(np.maximum, apart, np.float64(0.0))
-    return np.where(longest > 0.0, longest, 1.0)
+    return largest_distance([*body.points.values(), body.center])
 
 
 @lru_cache(maxsize=64)
