@@ -33,13 +33,9 @@ class Lanes:
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        width: int,
-        record: Array | None = None,
-        observed: at.Effects | None = None,
+        self, problem: Problem, width: int, record: Array | None = None, observed: at.Effects | None = None,
         kept: int = 1,
-    ) -> None:
+    ) -> None:  # fmt: skip
         n = problem.coordinates
         self.problem = problem
         self.width = width
@@ -78,26 +74,21 @@ class Lanes:
         self._effects = effects
         self._compiled = False
 
-    @property
-    def _widths(self) -> tuple[int, int]:
-        """Lanes of its motions, 0 for none: of all lanes, and of eight stiff ones."""
-        return self.width, 0 if self._memory is None else COLUMNS
-
     def _compile(self) -> None:
         """Compile or load the stepper and what it calls."""
-        problem, effects, widths = self.problem, self._effects, self._widths
-        stiff = self._memory is not None
+        problem, effects, stiff = self.problem, self._effects, self._memory is not None
+        widths = self.width, COLUMNS if stiff else 0  # of all lanes, and of eight stiff ones
         explicit = explicit_code(self.width, problem.tableau.stages).address
         kinds = kind_of(self._arguments(0)).parts
         self._step = make_stepper(self.width, kinds, implicit=stiff)
         implicit = batch_code().address if stiff else 0
         self._codes = Codes(special_code().address, explicit, implicit)
         numbers = self._method.numbers
-        for row, width in zip((Asking.MOTION, Asking.MOTION_OF_EIGHT), widths, strict=True):
-            numbers[row] = problem.motion(effects, width).address if width else 0
-        if self._observed is not None:
-            for row, width in zip((Asking.OBSERVING, Asking.OBSERVING_EIGHT), widths, strict=True):
-                numbers[row] = problem.motion(self._observed, width).address if width else 0
+        motions = {Asking.MOTION: effects, Asking.OBSERVING: self._observed}
+        for first, of in motions.items():
+            for row, width in enumerate(widths, first):
+                if of is not None and width:
+                    numbers[row] = problem.motion(of, width).address
         self._observer = int(numbers[Asking.OBSERVING] or numbers[Asking.MOTION])
         if self._rules.profile:
             numbers[Asking.PROFILE] = profile_code(effects, self.width).address
@@ -288,11 +279,6 @@ def _outcomes(problem: Problem, par: Array) -> Array:
     rows[:, Outcome.time] = revolutions * par[:, at.PERIOD]
     works = Outcome.total + at.WORKS
     rows[:, works : works + 4] = np.nan
-    known = (
-        (Outcome.peak_moment, at.HELD_MOMENT),
-        (Outcome.acceleration_deviation, at.HELD_DEVIATION),
-        (Outcome.peak_acceleration, at.HELD_PEAK),
-    )
-    for row, of_sample in known:
-        rows[:, row] = par[:, of_sample]
+    held = slice(Outcome.peak_moment, Outcome.peak_acceleration + 1)
+    rows[:, held] = par[:, at.HELD_MOMENT : at.HELD_PEAK + 1]
     return rows

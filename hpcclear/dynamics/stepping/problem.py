@@ -43,31 +43,24 @@ class Problem:
     Raises ValueError if coordinates or tolerances do not fit the kernel.
     """
 
-    linkage: Linkage
-    """Whose motion it is."""
+    linkage: Linkage  # whose motion it is
     effects: at.Effects
     coordinates: int
     tableau: Tableau
     rtol: float
-    atol: tuple[float, ...]
-    """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
-    impact_floor: float
-    """Least `latched` impact speed, m/s."""
+    atol: tuple[float, ...]  # of coordinates, then velocities, SI (2 * coordinates)
+    impact_floor: float  # least `latched` impact speed, m/s
     transient: int
     averaged: int
     max_steps: int
-    implicit: str = "never"
-    """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
-    cycle: float = at.TURN
-    """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
-    parameter_rows: int = at.OWN
-    """Parameters of a sample."""
-    curves: tuple[Pieces, ...] = ()
-    """Its tables."""
-    chosen: tuple[int, ...] = ()
-    """Places of the joints whose gaps count for f; none for all."""
-    from_rest: bool = False
-    """Whether the body that a torque drives may begin at rest."""
+    implicit: str = "never"  # when lanes take implicit steps, a key of `IMPLICIT_USE`
+    cycle: float = (
+        at.TURN
+    )  # turn of the driven body in a revolution, rad: < 0 clockwise, 0 of a swing
+    parameter_rows: int = at.OWN  # parameters of a sample
+    curves: tuple[Pieces, ...] = ()  # its tables
+    chosen: tuple[int, ...] = ()  # places of the joints whose gaps count for f; none for all
+    from_rest: bool = False  # whether the body that a torque drives may begin at rest
 
     def __post_init__(self) -> None:
         n = self.coordinates
@@ -106,10 +99,8 @@ class Problem:
     def wraps(self) -> Array:
         """By how much each coordinate (n,) is counted anew with a revolution, rad; 0 of those that do not go round with it."""
         linkage = self.linkage
-        gained = [
-            linkage.gained(one.body) if one.kind == "angle" else 0.0
-            for one in linkage.forest.coordinates
-        ]
+        turns = ((one.kind == "angle", one.body) for one in linkage.forest.coordinates)
+        gained = [linkage.gained(body) if turning else 0.0 for turning, body in turns]
         return np.array([0.0] * at.bristles_of(self.effects) + gained)
 
     def motion(self, effects: at.Effects, width: int) -> "Compiled":

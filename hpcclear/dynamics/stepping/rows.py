@@ -36,9 +36,8 @@ def before_row(lane, W, work, c):
     ahead, behind = work[(at.NEXT_ROW + c) * W + lane], work[(at.LAST_ROW + c) * W + lane]
     moved = moved_on(lane, W, work, c)
     way = 1.0 if moved > 0.0 else -1.0
-    left = way * (
-        (ahead if moved > 0.0 else behind) - work[(at.RATE_OLD + at.PLACES + c) * W + lane]
-    )
+    row = ahead if moved > 0.0 else behind
+    left = way * (row - work[(at.RATE_OLD + at.PLACES + c) * W + lane])
     reach = row_reach(work, c, lane, W)
     if ahead <= behind or abs(moved) <= left + reach or left <= reach:
         return 2.0
@@ -62,9 +61,9 @@ def stop_at_rows(rules, lane, W, work):
 def row_of(lane, W, par, tables, c, k):
     """Where row k of table c stands: a share of its length, or what the sample's parameters say."""
     row = tables[(int(tables[curves.HEAD * c + curves.BREAKS]) + k) & curves.PLACES]
-    return (
-        par[int(row) * W + lane] if tables[curves.HEAD * c + curves.IN_PARAMETERS] == 1.0 else row
-    )
+    if tables[curves.HEAD * c + curves.IN_PARAMETERS] == 1.0:
+        return par[int(row) * W + lane]
+    return row
 
 
 @lane_event

@@ -54,9 +54,7 @@ def load(lane, W, n, block, queue, settings):
     """Give a lane the next sample of the queue, or let it rest."""
     work, book = block.work, block.book
     slot = queue.counters[Counter.NEXT_SLOT]
-    for k in range(at.TIME, at.WORK):
-        work[k * W + lane] = 0.0
-    for k in range(at.RATE_OLD, at.TIME):
+    for k in range(at.RATE_OLD, at.WORK):
         work[k * W + lane] = 0.0
     for k in range(at.LARGEST_RATE, at.WORK):
         work[k * W + lane] = -1e300

@@ -16,8 +16,8 @@ from hpcclear.dynamics.stepping import stops
 from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 
-NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION, END_OF_SAMPLE = range(4)
-"""What may be requested; the status of a sample that ends stands in `FOUND`."""
+NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION = range(3)
+"""What may be requested."""
 
 
 @scalar_function
@@ -64,8 +64,6 @@ def answer(numbers, rules, block, queue, settings, tables):
         stops.wrap_angles(lane, W, n, block.work, settings)
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
-    elif asked == END_OF_SAMPLE:
-        status = numbers[Asking.FOUND]
     before = block.work[at.RUNNING * W + lane]
     if ends:
         change_sample(lane, W, n, status, block, queue, settings)

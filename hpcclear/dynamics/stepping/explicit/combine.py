@@ -41,10 +41,9 @@ def latest(step, k, stage, i, W):
     """Accelerations of the stage before, put away on the way (those of the first stage already are)."""
     if stage == 0:
         return step.stages[k * W + i]
-    else:
-        a = step.work[(at.ACC + k) * W + i]
-        step.stages[stage_row(stage, k) * W + i] = a
-        return a
+    a = step.work[(at.ACC + k) * W + i]
+    step.stages[stage_row(stage, k) * W + i] = a
+    return a
 
 
 @lane_function

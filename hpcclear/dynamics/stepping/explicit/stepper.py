@@ -17,7 +17,7 @@ from hpcclear.dynamics.layout.arguments import Asking, Block, Stepped, rules_in
 from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
-from hpcclear.dynamics.stepping.explicit.switching import settle_methods
+from hpcclear.dynamics.stepping.explicit.steps import settle_methods
 from hpcclear.dynamics.stepping.implicit.batch import ask_implicit
 from hpcclear.dynamics.stepping.peaks import peaks_inside
 from hpcclear.dynamics.stepping.record import record_step

@@ -1,4 +1,4 @@
-"""Implicit steps where the motion is stiff (see `switching`): batches of eight stiff samples, one to a SIMD lane.
+"""Implicit steps where the motion is stiff (see `explicit.steps`): batches of eight stiff samples, one to a SIMD lane.
 
 A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
 revolutions, sums, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit

@@ -108,13 +108,8 @@ def root_of(number):
 def forget(m, i):
     """Nothing is known of earlier steps: the lane comes from the explicit method or is new."""
     for number in (
-        mem.POLYNOMIAL_STEP,
-        mem.KEPT_STEP,
-        mem.ACCEPTED_STEP,
-        mem.RATE_SLOPE,
-        mem.TRIED_ERROR,
-        mem.KINK_CUTS,
-    ):
+        mem.POLYNOMIAL_STEP, mem.KEPT_STEP, mem.ACCEPTED_STEP, mem.RATE_SLOPE, mem.TRIED_ERROR, mem.KINK_CUTS
+    ):  # fmt: skip
         m[number + i] = 0.0
     for number in (mem.CONTINUES, mem.CONTRACTION, mem.RATE):
         m[number + i] = 1.0

@@ -39,10 +39,8 @@ def kinks_of_joint(rules, m, p, row):
     # in flight no force is transmitted, and a change of the gap's sign is the stepper's to find: an impact to be located
     touching = above(fetch(m, at.ACTIVE + p), gap, nothing) if rules.latched else gap
     factor = above(touching, fetch(m, at.RATE_NOW + at.FORCE_KINKS + p), nothing)
-    low, high = (
-        fetch(m, at.RATE_NOW + at.LOW_KINKS + p),
-        fetch(m, at.RATE_NOW + at.HIGH_KINKS + p),
-    )
+    low = fetch(m, at.RATE_NOW + at.LOW_KINKS + p)
+    high = fetch(m, at.RATE_NOW + at.HIGH_KINKS + p)
     put(m, row, factor)
     put(m, row + 1, above(factor, low, nothing))
     put(m, row + 2, above(factor, high, nothing))
@@ -74,8 +72,7 @@ def crossing(start, one, two, three, beyond):
     """Where a function with these values at the start of the step and at its stages gets `beyond` its zero; 2 if never."""
     if min(start * one, start * two, start * three) < 0.0:
         return crossing_between(start, one, two, three, beyond)
-    else:
-        return 2.0
+    return 2.0
 
 
 @scalar_function

@@ -138,11 +138,8 @@ def decouple(n, m):
         z0, z1, z2 = fetch(m, z), fetch(m, z + N), fetch(m, z + 2 * N)
         for s in range(STAGES):
             row = mem.TRANSFORMED + s * N + k
-            put(
-                m,
-                row,
-                rad.T_INVERSE[s, 0] * z0 + rad.T_INVERSE[s, 1] * z1 + rad.T_INVERSE[s, 2] * z2,
-            )
+            first, second = rad.T_INVERSE[s, 0] * z0, rad.T_INVERSE[s, 1] * z1
+            put(m, row, first + second + rad.T_INVERSE[s, 2] * z2)
 
 
 @lane_function
