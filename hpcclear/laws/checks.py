@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.unit_names import UNITS, parts
 from hpcclear.laws import declared
 from hpcclear.laws.declared import ContactLaw, FrictionLaw, Function, Law, Parameter
 from hpcclear.laws.numbers import elastic_at, evaluate, force_of, sample_numbers, stored, with_words
-from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import text_of
 from hpcclear.laws.translate import LawError
 
 MOST_PARAMETERS = 32
+MEND = "Correct the formula, or the parameters"
 
 TYPICAL = dict(zip(declared.JOINT, (9e8, 1.7e-9, 0.02, 0.0197, 3e-4, 0.02, 0.0, 0.0), strict=True))
 """A joint of the paper's: what laws are tried on."""
@@ -113,6 +114,74 @@ def check_shape(law: Law) -> None:
     text_of(law)
 
 
+# ---- numbers with units, as Pint has them: what functions are run on to check their units ----------
+Quantity = Any
+"""Of Pint, which has no types here, or a plain number."""
+
+
+@lru_cache(maxsize=1)
+def registry() -> Any:
+    """Pint's units."""
+    from pint import UnitRegistry
+
+    return UnitRegistry()
+
+
+def _pure(x: Quantity) -> Quantity:
+    return x.to("").magnitude if hasattr(x, "magnitude") else x
+
+
+def _size_and_sign(x: Quantity, y: Quantity) -> Quantity:
+    size = y.magnitude if hasattr(y, "magnitude") else y
+    return -abs(x) if size < 0 else abs(x)
+
+
+def _of_pure(function: Function) -> Function:
+    def of(x: Quantity) -> Quantity:
+        if np.iscomplexobj(pure := _pure(x)):
+            raise ValueError("complex number")
+        return registry().Quantity(float(function(pure)), "")
+
+    return of
+
+
+WORDS = {
+    "sqrt": lambda x: x**0.5, "fabs": abs, "absolute": abs, "copysign": _size_and_sign, "minimum": min, "maximum": max,
+    **dict.fromkeys(("pow", "power"), lambda x, y: x ** _pure(y)),
+    **{name: _of_pure(getattr(np, name)) for name in ("exp", "log", "tanh", "arctan")},
+    "atan": _of_pure(np.arctan),
+}  # fmt: skip
+"""What functions may call, for such numbers."""
+
+_NAMED = {
+    frozenset(dimensions.items()): name
+    for name, dimensions in (
+        ("newton", UNITS["N"][1]), ("pascal", UNITS["Pa"][1]), ("joule", UNITS["J"][1]), ("watt", UNITS["W"][1]),
+    )
+}  # fmt: skip
+"""Pint's names of units, so that fractional powers of one cancel to the last digit."""
+
+
+def unit_of(unit: str, name: str) -> Quantity:
+    """One of a unit, as pint has it; LawError says of which number it is not known."""
+    made = registry().Quantity(1.0, "")
+    if not isinstance(unit, str):
+        raise LawError(f"the unit of {name} is {unit!r}", 'Write it in quotes, "s/m"')
+    try:
+        for _, (size, own), power in parts(unit) if unit else ():
+            known = _NAMED.get(frozenset(own.items()))
+            powers = (
+                {base: float(one) for base, one in own.items()} if known is None else {known: 1.0}
+            )
+            scale = size if known is None else size / 1000
+            one = registry().Quantity(float(scale), registry().UnitsContainer(powers))
+            made = made * one ** float(power)
+    except ValueError:
+        reason = f"the unit {unit!r} of {name} is not known"
+        raise LawError(reason, "Write, say, s/m") from None
+    return made
+
+
 # ---- units ----------------------------------------------------------------------------------------
 def check_units(law: Law, values: Mapping[str, object]) -> None:
     """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
@@ -126,8 +195,7 @@ def check_units(law: Law, values: Mapping[str, object]) -> None:
             with np.errstate(all="ignore"):
                 return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
         except (ZeroDivisionError, OverflowError):
-            reason = f"{title} is not finite"
-            raise LawError(reason, "Correct the formula, or the parameters") from None
+            raise LawError(f"{title} is not finite", MEND) from None
         except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
             reason = f"{title} does not fit its units: {error}"
             raise LawError(reason, "Correct the formula, or the unit of a parameter") from None
@@ -218,8 +286,7 @@ def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
 
     bad = ~np.isfinite(force)
     if bad.any():
-        reason = f"the force is not finite {where(bad)}"
-        raise LawError(reason, "Correct the formula, or the parameters")
+        raise LawError(f"the force is not finite {where(bad)}", MEND)
     pulls = (force < 0.0) & (rate >= 0.0)
     if pulls.any():
         reason = f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}"
@@ -273,8 +340,7 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     ratio = np.broadcast_to(evaluate(law.ratio, {**given, **varying}), SPEEDS.shape)
     bad = ~np.isfinite(ratio)
     if bad.any():
-        reason = f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s"
-        raise LawError(reason, "Correct the formula, or the parameters")
+        raise LawError(f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s", MEND)
     drives = ratio * SPEEDS < -1e-12 * np.abs(ratio * SPEEDS).max()
     if drives.any():
         raise LawError(
@@ -284,8 +350,7 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     if law.deflection is not None:
         rate = np.broadcast_to(evaluate(law.deflection, {**given, **varying}), SPEEDS.shape)
         if not np.isfinite(rate).all():
-            reason = "the rate of deflection is not finite"
-            raise LawError(reason, "Correct the formula, or the parameters")
+            raise LawError("the rate of deflection is not finite", MEND)
 
 
 @lru_cache(maxsize=256)

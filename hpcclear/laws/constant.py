@@ -110,8 +110,7 @@ class _Parts(ast.NodeTransformer):
         """A function of the same surroundings."""
         around = {**self.own.__globals__, **inspect.getclosurevars(self.own).nonlocals}
         around.pop("__name__", None)  # its lines are in no module
-        made: Function = function_of(f"def {name}({', '.join(names)}):\n{body}\n", name, around)
-        return made
+        return function_of(f"def {name}({', '.join(names)}):\n{body}\n", name, around)
 
     def function(self) -> Function:
         body = "\n".join(ast.unparse(ast.fix_missing_locations(one)) for one in self.tree.body)

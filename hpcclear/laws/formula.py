@@ -2,13 +2,13 @@
 
 import ast
 import hashlib
-import linecache
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 from hpcclear.base.arithmetic import WORDS, read
+from hpcclear.base.generated import run_text
 from hpcclear.base.unit_names import dimensions
 from hpcclear.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Function, Law, Parameter
 from hpcclear.laws.translate import LawError
@@ -57,8 +57,7 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     function = function_of(text, entry)
     maker: Any = ContactLaw if kind == "contact" else FrictionLaw
     named = {"name": "expression", "words": "a formula in the scene", entry: function}
-    made: Law = maker(formula=formula, parameters=parameters, **named)
-    return made
+    return maker(formula=formula, parameters=parameters, **named)
 
 
 def _check_si(name: str, unit: str) -> None:
@@ -77,8 +76,6 @@ def _check_si(name: str, unit: str) -> None:
 def function_of(text: str, name: str, around: Mapping[str, object] | None = None) -> Function:
     """The function `name` of a text, whose lines `inspect` finds; `around`: what it may use."""
     path = f"<formula {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
-    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
     names: dict[str, Any] = {**(around or {})}
-    exec(compile(text, path, "exec"), names)
-    made: Function = names[name]
-    return made
+    run_text(text, path, names)
+    return names[name]

@@ -60,19 +60,20 @@ def damping(damping):
 
 
 HERTZIAN: dict[str, Any] = {
-    "elastic": elastic,
-    "energy": energy,
-    "swing": swing,
-    "exponent": exponent,
-    "damping": damping,
+    "elastic": elastic, "energy": energy, "swing": swing, "exponent": exponent, "damping": damping,
     "without_loss": "hertz",
-}
+}  # fmt: skip
 """What all laws have whose elastic part is Hertz's."""
 
 
 def latched_factor(rate, inverse_impact_speed, damping):
     """1 + a d'/d'_0."""
     return 1.0 + damping * rate * inverse_impact_speed
+
+
+RESTITUTION = Parameter(
+    "restitution", "", "coefficient of restitution", least=0, most=1, example="0.9"
+)
 
 
 def _above_zero(values):
@@ -91,11 +92,7 @@ def by_restitution(
         source=source,
         formula=f"K d^1.5 (1 + a d'/d'_0), a = {formula}",
         valid=valid,
-        parameters=(
-            Parameter(
-                "restitution", "", "coefficient of restitution", least=0, most=1, example="0.9"
-            ),
-        ),
+        parameters=(RESTITUTION,),
         once=lambda restitution: {"damping": factor(restitution)},
         numbers={"damping": ""},
         factor=latched_factor,

@@ -6,9 +6,8 @@ import numpy as np
 
 from hpcclear.base.objectives import MADE, OF_ALL, OF_JOINTS, RECORDED, Objective, arguments
 from hpcclear.base.outcome import FIELDS
-from hpcclear.laws.checks import TYPICAL
+from hpcclear.laws.checks import TYPICAL, WORDS, Quantity, registry, unit_of
 from hpcclear.laws.numbers import evaluate, with_words
-from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import HEAD
 from hpcclear.laws.translate import LawError, written
 

@@ -8,7 +8,6 @@ import ast
 import builtins
 import inspect
 import math
-import sys
 import textwrap
 from collections.abc import Callable
 from types import FunctionType, ModuleType
@@ -34,23 +33,13 @@ _ORDERS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
 def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
     """The syntax tree of a function."""
     try:
-        tree = ast.parse(textwrap.dedent(_source(function))).body[0]
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     except (OSError, TypeError, SyntaxError, IndexError):
         raise LawError("its source cannot be read", "Write it with def in a file") from None
     if not isinstance(tree, ast.FunctionDef):
         reason = "is not a function written with def"
         raise LawError(reason, "Write it with def, at the top of the file")
     return tree
-
-
-def _source(function: Callable[..., object]) -> str:
-    """The lines of a function; of a text that stands in no file, from its module's loader."""
-    loader: object = getattr(sys.modules.get(function.__module__), "__loader__", None)
-    path = function.__code__.co_filename
-    if path.startswith("<") and hasattr(loader, "get_source"):
-        lines = loader.get_source(function.__module__).splitlines(keepends=True)
-        return "".join(inspect.getblock(lines[function.__code__.co_firstlineno - 1 :]))
-    return inspect.getsource(function)
 
 
 def written(function: Callable[..., object], name: str, title: str) -> list[str]:

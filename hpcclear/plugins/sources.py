@@ -5,18 +5,16 @@ A text is run in a module of its own, named by its hash; the file is not needed 
 
 import contextlib
 import hashlib
-import importlib.abc
-import importlib.util
-import linecache
 import re
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.generated import run_text
 
 REFERENCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,39}):([A-Za-z_][A-Za-z0-9_]{0,79})")
 """``"module:Name"``."""
@@ -83,22 +81,6 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-class _Loader(importlib.abc.InspectLoader):
-    """Runs a text; tracebacks, `inspect` and Numba find its lines here."""
-
-    def __init__(self, text: str, path: str) -> None:
-        self.text, self.path = text, path
-
-    def get_source(self, fullname: str) -> str:
-        return self.text
-
-    def get_code(self, fullname: str) -> CodeType:
-        return self.source_to_code(self.text, self.path)
-
-    def is_package(self, fullname: str) -> bool:
-        return False
-
-
 def run_source(module: str, text: str) -> ModuleType:
     """The module of a source text, run at most once in a process; `module`: its name in scenes, ``"mylaws"`` for mylaws.py.
 
@@ -108,14 +90,10 @@ def run_source(module: str, text: str) -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
     path = f"<{module}.py of the scene, {digest(text)[:12]}>"
-    spec = importlib.util.spec_from_loader(name, _Loader(text, path), origin=path)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
+    made = ModuleType(name)
     sys.modules[name] = made  # dataclasses look their module up while it is run
     try:
-        spec.loader.exec_module(made)
+        run_text(text, path, vars(made))
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         reason = "reading the file raised this error"

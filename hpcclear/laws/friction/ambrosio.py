@@ -49,10 +49,7 @@ LAW = FrictionLaw(
             example="[0.001, 0.01] (m/s)", count=2,
         ),
     ),
-    once=lambda speeds: {
-        "dead_speed": speeds[0],
-        "inverse_ramp": 1.0 / (speeds[1] - speeds[0]),
-    },
+    once=lambda speeds: {"dead_speed": speeds[0], "inverse_ramp": 1.0 / (speeds[1] - speeds[0])},
     numbers={"dead_speed": "m/s", "inverse_ramp": "s/m"},
     ratio=ratio,
     kinks=(low, high),
@@ -61,9 +58,6 @@ LAW = FrictionLaw(
     check=check,
     simpler=simpler,
     elsewhere={
-        "ramp_speed": (
-            "the law 'ambrosio' has two speeds",
-            "Write speeds = [0.001, 0.01] (m/s) instead",
-        )
+        "ramp_speed": ("the law 'ambrosio' has two speeds", "Write speeds = [0.001, 0.01] (m/s) instead")
     },
 )  # fmt: skip

@@ -33,13 +33,7 @@ LAW = FrictionLaw(
     valid="sliding faster than the ramp speed; within it surfaces creep and do not stick",
     parameters=(
         Parameter("coefficient", "", "coefficient of friction", least=0, example="0.01"),
-        Parameter(
-            "ramp_speed",
-            "m/s",
-            "sliding speed below which the force falls linearly to 0",
-            0.01,
-            above=0,
-        ),
+        Parameter("ramp_speed", "m/s", "sliding speed below which the force falls linearly to 0", 0.01, above=0),
     ),
     once=lambda ramp_speed: {"inverse_ramp": 1.0 / ramp_speed},
     numbers={"inverse_ramp": "s/m"},
@@ -48,7 +42,5 @@ LAW = FrictionLaw(
     inverse_ramp=lambda inverse_ramp: inverse_ramp,
     steepness=lambda coefficient, inverse_ramp: coefficient * inverse_ramp,
     simpler=simpler,
-    elsewhere={
-        "speeds": ("the law 'coulomb' has one ramp speed", "Write ramp_speed = 0.01 (m/s) instead")
-    },
-)
+    elsewhere={"speeds": ("the law 'coulomb' has one ramp speed", "Write ramp_speed = 0.01 (m/s) instead")},
+)  # fmt: skip

@@ -37,12 +37,8 @@ GEOMETRY = Geometry(
     valid="liners that are thin beside the width of contact, up to a tenth of their thickness",
     parameters=(
         Parameter("liner_thickness", "m", "thickness of the liner", above=0, example='"2 mm"'),
-        Parameter(
-            "liner_modulus", "Pa", "Young's modulus of the liner", above=0, example='"3 GPa"'
-        ),
-        Parameter(
-            "liner_poisson_ratio", "", "Poisson's ratio of the liner", 0.4, least=0, below=0.5
-        ),
+        Parameter("liner_modulus", "Pa", "Young's modulus of the liner", above=0, example='"3 GPa"'),
+        Parameter("liner_poisson_ratio", "", "Poisson's ratio of the liner", 0.4, least=0, below=0.5),
     ),
     once=of_liner,
     numbers={"foundation": "N/m"},
@@ -51,4 +47,4 @@ GEOMETRY = Geometry(
     pressure=pressure,
     half_angle=half_angle,
     has_length=True,
-)
+)  # fmt: skip

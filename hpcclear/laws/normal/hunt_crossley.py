@@ -16,15 +16,10 @@ LAW = ContactLaw(
     valid="any impact speed; chi is a property of the contact, not of the impact",
     parameters=(
         Parameter(
-            "damping",
-            "s/m",
-            "fixed damping factor chi",
-            least=0,
-            example="0.5 (s/m)",
-            called="fixed damping factor",
+            "damping", "s/m", "fixed damping factor chi", least=0, example="0.5 (s/m)", called="fixed damping factor"
         ),
     ),
     factor=factor,
     lossless=lambda values: values["damping"] == 0,
     **HERTZIAN,
-)
+)  # fmt: skip

@@ -26,17 +26,11 @@ LAW = ContactLaw(
         Parameter("depth_at", "m", "reference depth", above=0, example='"2 um"'),
         Parameter("exponent", "", "exponent of the depth", above=0, example="1.5"),
         Parameter("greatest_damping", "N*s/m", "largest damping", least=0, example='"50 N*s/m"'),
-        Parameter(
-            "full_depth",
-            "m",
-            "depth from which the damping has its largest value",
-            above=0,
-            example='"1 um"',
-        ),
+        Parameter("full_depth", "m", "depth from which the damping has its largest value", above=0, example='"1 um"'),
     ),
     force=force,
     elastic=elastic,
     energy=energy,
     swing=swing,
     exponent=lambda exponent: exponent,
-)
+)  # fmt: skip
