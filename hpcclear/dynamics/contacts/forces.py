@@ -12,10 +12,7 @@ from hpcclear.dynamics.physics.friction import share_of
 @lane_function
 def product(flag, a, b):
     """a b, or 0 with the effect off: a product with 0 is not dropped by the compiler, since b may be infinite."""
-    if flag is not None:
-        return a * b
-    else:
-        return 0.0
+    return a * b if flag is not None else 0.0
 
 
 @lane_function
@@ -48,10 +45,9 @@ def ratio_of(effects, work, par, joint, sliding, normal, i, W):
         rate = effects.friction.deflection(par, row, sliding, normal, deflection, 0.0, i, W)
         work[(at.ACC + number) * W + i] = rate
         return effects.friction.ratio(par, row, sliding, normal, deflection, rate, i, W)
-    elif effects.friction is not None:
+    if effects.friction is not None:
         return effects.friction.ratio(par, row, sliding, normal, 0.0, 0.0, i, W)
-    else:
-        return 0.0
+    return 0.0
 
 
 @lane_function
@@ -60,8 +56,7 @@ def sides_of(law, par, row, sliding, i, W):
     if law is not None:
         low = law.low(par, row, sliding, 0.0, 0.0, 0.0, i, W)
         return low, law.high(par, row, sliding, 0.0, 0.0, 0.0, i, W)
-    else:
-        return 0.0, 0.0
+    return 0.0, 0.0
 
 
 @lane_function
@@ -143,8 +138,7 @@ def force_that_wears(threshold, par, joint, normal, i, W):
         row = at.THRESHOLDS + 2 * joint.place
         share = par[row * W + i] * normal + par[(row + 1) * W + i]
         return normal * share_of(share)
-    else:
-        return normal
+    return normal
 
 
 @lane_function
@@ -157,7 +151,4 @@ def store_rate(flag, work, row, value, i, W):
 @lane_function
 def switched(latched, force, active):
     """A `latched` contact is on or off for a whole step, so that a step ends exactly at an impact."""
-    if latched is not None:
-        return force * active
-    else:
-        return force
+    return force * active if latched is not None else force

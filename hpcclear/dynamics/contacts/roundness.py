@@ -31,19 +31,13 @@ class Here(NamedTuple):
 @lane_function
 def less(flag, a, b):
     """a - b, or a with the effect off."""
-    if flag is not None:
-        return a - b
-    else:
-        return a
+    return a - b if flag is not None else a
 
 
 @lane_function
 def counted(waves):
     """How many waves a surface has."""
-    if waves is not None:
-        return waves
-    else:
-        return 0
+    return waves if waves is not None else 0
 
 
 @lane_function
@@ -73,8 +67,7 @@ def waves_at(flag, par, row, cosine, sine, i, W):
     """`depth_and_slope` of a surface that is out of round, 0 of a round one."""
     if flag is not None:
         return depth_and_slope(flag, par, row, cosine, sine, i, W)
-    else:
-        return 0.0, 0.0
+    return 0.0, 0.0
 
 
 @lane_function
@@ -95,8 +88,7 @@ def waves_here(effects, par, joint, relative, normal, turns, i, W):
         turning = (vy * nx - vx * ny) * inverse
         widening = slope * (turning - spin_bearing) + rise * (turning - spin_journal)
         return Here(deep, shallow, slope, rise, widening, own, other)
-    else:
-        return Here(0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
+    return Here(0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
 
 
 @lane_function
@@ -106,8 +98,7 @@ def tilted(flag, here, normal, force):
         nx, ny, inverse = normal
         across = force * (here.slope + here.rise) * inverse
         return across * ny, -across * nx, -force * here.slope, -force * here.rise
-    else:
-        return 0.0, 0.0, 0.0, 0.0
+    return 0.0, 0.0, 0.0, 0.0
 
 
 @lane_function
