@@ -12,22 +12,10 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, WIDEST, Status
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluation.evaluator import (
-    alone,
-    impacts_reported,
-    outcome_records,
-    responses_reported,
-)
-from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
+from hpcclear.dynamics.evaluation import evaluate_records, evaluator
+from hpcclear.dynamics.evaluation.recorded import steps
+from hpcclear.dynamics.evaluation.recorded.impacts import measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import Heard, instants_of
-from hpcclear.dynamics.evaluation.recorded.steps import (
-    ITSELF,
-    Piece,
-    Recorded,
-    Recording,
-    seen_between,
-)
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
@@ -41,7 +29,6 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.sizing import kept_revolutions
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
-from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
@@ -99,8 +86,8 @@ def simulated(
         found = _prescribed(scene)
     else:
         replicated = checked and not copy and steady is None
-        perturbations = alone(scene.numerics.rtol) if replicated else ()
-        recording = Recording(scene, (copy,), perturbations, objective)
+        perturbations = evaluator.alone(scene.numerics.rtol) if replicated else ()
+        recording = steps.Recording(scene, (copy,), perturbations, objective)
         collected = Collected(scene, recording.samples[0])
         for rows in recording.chunks():
             collected.take(rows)
@@ -126,7 +113,7 @@ def simulate_together(
             yield k, simulated(scenes[k], copy=copies[k], checked=False)
             continue
         first, *others = (scenes[k] for k in numbers)
-        recording = Recording(first, [copies[k] for k in numbers], beside=others)
+        recording = steps.Recording(first, [copies[k] for k in numbers], beside=others)
         collected = [
             Collected(scenes[k], one) for k, one in zip(numbers, recording.samples, strict=True)
         ]
@@ -171,7 +158,7 @@ def _response(
     names = [*_REPORTED, *(WIDEST if scene.effects.has_pressure and not still else ())]
     names += [] if steady is None else [*STEADY, "regime"]
     if steady is None and not still:  # what the sample measures as well has its bits
-        names += [name for name in impacts_reported(problem_of(scene)) if name in data]
+        names += [name for name in evaluator.impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
         curves = curves_of(scene)
         angle, constant = data["crank_angle"], scene.effects.slider_load
@@ -236,7 +223,7 @@ def _steady(scene: Scene) -> Records | None:
     """The record (1,) of the steady mean, where the scene names a target error; None: it requires a segment."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
-    return evaluate_records(scene, ITSELF)
+    return evaluate_records(scene, steps.ITSELF)
 
 
 def _shown(scene: Scene, steady: Records) -> Scene:
@@ -258,7 +245,9 @@ def _prescribed(scene: Scene) -> Found:
     lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(*lanes.collect(), record_of(scene), responses_reported(problem))
+    record = evaluator.outcome_records(
+        *lanes.collect(), record_of(scene), evaluator.responses_reported(problem)
+    )
     times, data = prescribed_series(scene, problem.transient + problem.averaged)
     first = problem.transient + problem.averaged - kept_revolutions(scene)
     kept = times >= (first - 1e-9) * mechanism_of(scene.linkage).period.seconds
@@ -269,7 +258,7 @@ def _prescribed(scene: Scene) -> Found:
 class Collected(Heard):
     """Time series of one sample of a recording, as its steps come; raises InputError where they do not fit into memory."""
 
-    def __init__(self, scene: Scene, sample: Recorded) -> None:
+    def __init__(self, scene: Scene, sample: steps.Recorded) -> None:
         count = scene.output.instants_per_revolution
         super().__init__(scene, sample, count, instants_of(scene, sample))
         self._parts: list[dict[str, Array]] = []
@@ -277,11 +266,11 @@ class Collected(Heard):
         self._kept, self._began = kept_revolutions(scene), 0.0
         self._revolutions: list[Array] = []
 
-    def add(self, piece: Piece) -> None:
+    def add(self, piece: steps.Piece) -> None:
         """Take a piece."""
         super().add(piece)
         count = self.scene.output.instants_per_revolution
-        seen, first = seen_between(self.sample, piece, works=True), self.scene.bristles
+        seen, first = steps.seen_between(self.sample, piece, works=True), self.scene.bristles
         seen = seen._replace(q=seen.q[:, first:], v=seen.v[:, first:])
         series = {"time": piece.times, **planar_series(self.scene, self.sample.par, seen)}
         if not self._taken:
@@ -308,7 +297,10 @@ class Collected(Heard):
         data["energy_residual"] -= self._began
         problem = self.sample.problem
         if Status(int(record["status"][0])).valid and problem.effects.joints:
-            data |= _measured(self.scene, problem, self.turns)
+            periods, integrals = self.turns.averaged(problem.transient)
+            first = problem.transient + 1
+            data["revolution"] = np.arange(float(first), first + len(periods))
+            data |= measured_of(self.scene, problem, periods, integrals)
             when = self.turns.when[: len(self.scene.joint_labels)]
             kept = (when >= data["time"][0]) & (when <= data["time"][-1])
             angles = np.interp(when, data["time"], data["crank_angle"])
@@ -326,16 +318,6 @@ class Collected(Heard):
         if ended and count:
             return slice(max(len(revolution) - count * self._kept - 1, 0), None)
         return slice(max(int(np.searchsorted(revolution, end - self._kept)) - 1, 0), None)
-
-
-def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Array]:
-    """Measures of impact and noise of the averaged revolutions, and the coordinate that goes with them."""
-    periods, integrals = turns.averaged(problem.transient)
-    first = problem.transient + 1
-    return {
-        "revolution": np.arange(float(first), first + len(periods)),
-        **measured_of(scene, problem, periods, integrals),
-    }
 
 
 def _refuse_what_does_not_fit(size: float, count: int) -> None:

@@ -145,13 +145,8 @@ class Compiled:
     """
 
     def __init__(
-        self,
-        function: Value,
-        kinds: Sequence[Kind],
-        flags: Flags,
-        result: Value = None,
-        **known: Value,
-    ) -> None:
+        self, function: Value, kinds: Sequence[Kind], flags: Flags, result: Value = None, **known: Value
+    ) -> None:  # fmt: skip
         plain = getattr(function, "py_func", function)
         asked = repr((
             source_key(), linecache.getlines(plain.__code__.co_filename), plain.__qualname__,

@@ -103,14 +103,9 @@ class Evaluator:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        columns: Points,
-        lanes: int = DEFAULT_LANES,
-        perturbations: Sequence[int] = (),
-        objective: Objective = MEAN_GAP,
-        recorder: Lanes | None = None,
-    ) -> None:
+        self, scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = (),
+        objective: Objective = MEAN_GAP, recorder: Lanes | None = None,
+    ) -> None:  # fmt: skip
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
@@ -118,11 +113,8 @@ class Evaluator:
         self._copies = 1 + len(self._perturbations)
         self._objective = objective
         self._problem = problem = problem_of(scene)
-        self._lanes: Lanes | PrescribedSamples
-        if problem.coordinates:
-            self._lanes = recorder or Lanes(problem, lanes)
-        else:
-            self._lanes = PrescribedSamples(problem)
+        moves = problem.coordinates > 0
+        self._lanes = (recorder or Lanes(problem, lanes)) if moves else PrescribedSamples(problem)
         self._record, self._pressed = record_of(scene), scene.effects.has_pressure
         self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J

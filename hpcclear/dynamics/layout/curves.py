@@ -75,12 +75,8 @@ def _intervals(starts: Array) -> int:
     """The least number of intervals that hold one row each at most; 0 if that takes too many."""
     n = len(starts)
     most = min(max(FEW_INTERVALS, 2 * n), MOST_INTERVALS)
-    doubled = 1 << max(n - 1, 0).bit_length()
-    counts = [n]
-    while doubled <= most:
-        counts.append(doubled)
-        doubled *= 2
-    return next((one for one in counts if np.diff(_interval_of(starts, one)).all()), 0)
+    doubled = (1 << k for k in range(max(n - 1, 0).bit_length(), most.bit_length()))
+    return next((one for one in (n, *doubled) if np.diff(_interval_of(starts, one)).all()), 0)
 
 
 def _cells(curve: Pieces, intervals: int) -> Array:

@@ -74,8 +74,22 @@ class View:
         return type(self)(self.rows[which])
 
 
-class Start(View):
-    """Starts of samples: coordinates and velocities (of those the topology has), contact states."""
+class Moving(View):
+    """Rows with states in them: coordinates, then velocities, of those that the topology has; all places of either."""
+
+    moving: Column
+
+    def coordinates(self, n: int) -> Array:
+        """The n coordinates of a topology, shape (..., n)."""
+        return self.moving[..., :n]
+
+    def velocities(self, n: int) -> Array:
+        """Their velocities, shape (..., n)."""
+        return self.moving[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
+
+
+class Start(Moving):
+    """Starts of samples: states, and those of contacts."""
 
     _rows = Declared()
     moving = _rows.column("coordinates, then velocities, all places", "", 2 * at.MAX_COORDINATES)
@@ -88,14 +102,6 @@ class Start(View):
     def at_rest(cls, samples: int) -> "Start":
         """Starts that are all zero."""
         return cls(np.zeros((samples, cls.size)))
-
-    def coordinates(self, n: int) -> Array:
-        """The n coordinates of a topology, shape (..., n)."""
-        return self.rows[..., :n]
-
-    def velocities(self, n: int) -> Array:
-        """Their velocities, shape (..., n)."""
-        return self.rows[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
 
     def fail(self, statuses: Array) -> None:
         """Let samples (m,) with another status than OK fail at the start, without a step."""
@@ -113,7 +119,7 @@ class Start(View):
         return np.concatenate([self.coordinates(n), self.velocities(n)], axis=-1)
 
 
-class Outcome(View):
+class Outcome(Moving):
     """Outcomes of samples; numbers of a failed one are what it had got to, or NaN.
 
     Means are over the averaged revolutions, totals over all of them; those of rates that no effect requested are 0.
@@ -173,14 +179,6 @@ class Outcome(View):
         """Integral of a rate, by the name of its mean, over an averaged revolution."""
         mean: Array = getattr(self, name)
         return mean * self.period[:, None]
-
-    def coordinates(self, n: int) -> Array:
-        """The n coordinates of a topology at the end, shape (..., n)."""
-        return self.moving[..., :n]
-
-    def velocities(self, n: int) -> Array:
-        """Their velocities, shape (..., n)."""
-        return self.moving[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
 
     def end(self) -> Start:
         """Where the samples ended, to go on from; places that no coordinate has are 0."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
@@ -34,10 +34,8 @@ BEND = 1e-6
 PER_REVOLUTION = 720
 """Instants of a revolution, if no number is requested."""
 
-_NODES, _WEIGHTS = (
-    0.5 * (np.polynomial.legendre.leggauss(5)[0] + 1.0),
-    0.5 * np.polynomial.legendre.leggauss(5)[1],
-)  # on [0, 1]
+_FIVE, _OF_FIVE = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (_FIVE + 1.0), 0.5 * _OF_FIVE  # on [0, 1]
 
 OF_CONTACTS = (
     "eccentricity_x", "eccentricity_y", "penetration", "contact_force", "friction_force"
@@ -122,7 +120,8 @@ def _crossed(levels: Array, place: Array, rate: Array, times: Array) -> Array:
     first = np.searchsorted(levels, np.minimum(a, b))
     count = np.searchsorted(levels, np.maximum(a, b), side="right") - first
     k = np.repeat(np.arange(len(a)), count)
-    level = levels[first[k] + _within(count)]
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    level = levels[first[k] + within]
     h = np.diff(times)[k]
     low, high = np.zeros(len(k)), np.ones(len(k))
     rising = b[k] > a[k]
@@ -132,11 +131,6 @@ def _crossed(levels: Array, place: Array, rate: Array, times: Array) -> Array:
         beyond = (there > level) == rising
         low, high = np.where(beyond, low, s), np.where(beyond, s, high)
     return np.asarray(times[k] + h * s) if len(k) else np.zeros(0)
-
-
-def _within(count: Integers) -> Integers:
-    """0, 1, ... for each of groups of so many."""
-    return np.asarray(np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count))
 
 
 def _distance(held: Prescribed, first: str, second: str) -> tuple[Array, Array]:
@@ -188,15 +182,12 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     poses = Poses(found.assembly.loops.forest, {}, 0)
     par = poses.par_of(values(mechanism, cartesian=True, gravity=gravity))
     pose, _ = poses.at(par, found.q.T, found.v.T, times)
-    mass, inertia = (
-        np.array([getattr(body, part) for body in mechanism.bodies])[:, None]
-        for part in ("mass", "inertia")
-    )
+    mass = np.array([body.mass for body in mechanism.bodies])[:, None]
+    inertia = np.array([body.inertia for body in mechanism.bodies])[:, None]
     kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
     potential = gravity * (mass * pose.y).sum(axis=0)
-    driving, lost, load = (
-        _work(power, edges)[shown] for power in (dense.power, dense.loss, dense.load_power)
-    )
+    powers = dense.power, dense.loss, dense.load_power
+    driving, lost, load = (_work(power, edges)[shown] for power in powers)
     total = kinetic + potential
     places = bodies_and_points(mechanism, pose)
     acceleration = np.nan_to_num(_followed_acceleration(linkage_of(scene), found))
@@ -224,15 +215,12 @@ def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
     """Forces of the pins (t, pins), and by the names of a template, which has columns of joints with clearance besides."""
     holds = found.holds
     pins = pins_of(linkage_of(scene).mechanism)
-    forces = {
-        f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T for axis in "xy"
-    }
+    along = {axis: np.array([holds[f"{pin}_{axis}"] for pin in pins]).T for axis in "xy"}
+    forces = {f"pin_force_{axis}": one for axis, one in along.items()}
     if scene.template is None:
         return forces
-    parts = {
-        name: np.array([sign * holds[one] for one, sign in ones]).T
-        for name, ones in scene.template.HOLDS.items()
-    }
+    held = scene.template.HOLDS.items()
+    parts = {name: np.array([sign * holds[k] for k, sign in ones]).T for name, ones in held}
     none = at_places(scene, np.zeros((len(found.times), 0)))
     single = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
     return dict.fromkeys(OF_CONTACTS, none) | single | forces

@@ -218,14 +218,7 @@ def bodies_and_points(
 
     `shorter`: by how much the ends b of bars that bend come nearer, m, (t,), by the bodies' numbers.
     """
-    found: dict[str, Array] = {
-        "body_x": pose.x.T,
-        "body_y": pose.y.T,
-        "body_angle": pose.angle.T,
-        "body_vx": pose.vx.T,
-        "body_vy": pose.vy.T,
-        "body_spin": pose.spin.T,
-    }
+    found: dict[str, Array] = {f"body_{name}": one.T for name, one in pose._asdict().items()}
     arms = []
     for k, body in enumerate(mechanism.bodies):
         cosine, sine = np.cos(pose.angle[k]), np.sin(pose.angle[k])
@@ -241,12 +234,9 @@ def labels(scene: Scene, mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     """Labels along the dimensions ``body`` and ``point``; none where a template names the series."""
     if scene.template is not None:
         return {}
-    return {
-        "body": tuple(body.name for body in mechanism.bodies),
-        "point": tuple(
-            f"{body.name}.{point}" for body in mechanism.bodies for point in body.points
-        ),
-    }
+    bodies = tuple(body.name for body in mechanism.bodies)
+    points = tuple(f"{body.name}.{point}" for body in mechanism.bodies for point in body.points)
+    return {"body": bodies, "point": points}
 
 
 Path = Callable[[Array], Array]
@@ -256,12 +246,8 @@ INSTANTS = 720
 
 
 def followed(
-    scene: Scene,
-    phase: Array,
-    points: Mapping[str, Array],
-    acceleration: Array,
-    clearance: bool = True,
-) -> dict[str, Array]:
+    scene: Scene, phase: Array, points: Mapping[str, Array], acceleration: Array, clearance: bool = True
+) -> dict[str, Array]:  # fmt: skip
     """Series of the followed point, none where none is followed: place, acceleration (t,) and `path_error`.
 
     `phase` (t,): progress of the drive since the start, 2 pi a turn of its body, rad; `points`: ``point_x`` and ``point_y``
@@ -272,13 +258,10 @@ def followed(
         return {}
     names = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
     x, y = (points[f"point_{axis}"][:, names.index(place)] for axis in "xy")
-    found = {
-        "followed_x": x,
-        "followed_y": y,
-        "followed_acceleration_x": acceleration.real,
-        "followed_acceleration_y": acceleration.imag,
-    }
-    path = _path_of(scene) if clearance else None
+    found = {"followed_x": x, "followed_y": y}
+    found["followed_acceleration_x"] = acceleration.real
+    found["followed_acceleration_y"] = acceleration.imag
+    path = _ideal_path(scene, place) if clearance else None
     if path is not None:
         cycle = at.TURN * turns_of(scene.linkage)
         ideal = path(np.mod(phase, cycle) / cycle)
@@ -287,28 +270,20 @@ def followed(
 
 
 @lru_cache(maxsize=16)
-def _path_of(scene: Scene) -> Path | None:
-    place = scene.linkage.followed
-    return None if place is None else ideal_path(linkage_of(scene).mechanism, place)
-
-
-def _path(ideal: Mechanism, place: str) -> Path:
-    from scipy.interpolate import CubicHermiteSpline  # a third of a second, for these alone
-
-    drive = ideal.period
-    share = np.linspace(0.0, 1.0, INSTANTS * drive.turns + 1)
-    assembly = assemble(ideal)
-    times = share * drive.seconds
-    q, v = np.moveaxis(passed_through(assembly, times), 0, -1)
-    where, speed, *_ = placed(replace(assembly, q=q, v=v), place)
-    return CubicHermiteSpline(share, where, speed * drive.seconds)
-
-
-def ideal_path(mechanism: Mechanism, place: str) -> Path | None:
+def _ideal_path(scene: Scene, place: str) -> Path | None:
     """Where a place of the linkage is without clearance: complex m of the share of a revolution (t,); None where its drives
     leave something free then or do not repeat, or it cannot pass a dead centre."""
     try:
-        ideal = without_clearance(mechanism)
-        return None if freedom(ideal) else _path(ideal, place)
+        ideal = without_clearance(linkage_of(scene).mechanism)
+        if freedom(ideal):
+            return None
+        drive, assembly = ideal.period, assemble(ideal)
+        share = np.linspace(0.0, 1.0, INSTANTS * drive.turns + 1)
+        passed = passed_through(assembly, share * drive.seconds)
     except InputError:
         return None
+    from scipy.interpolate import CubicHermiteSpline  # a third of a second, for these alone
+
+    q, v = np.moveaxis(passed, 0, -1)
+    where, speed, *_ = placed(replace(assembly, q=q, v=v), place)
+    return CubicHermiteSpline(share, where, speed * drive.seconds)

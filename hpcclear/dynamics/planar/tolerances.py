@@ -39,14 +39,9 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     first, second = _of_bristles(scene, linkage.mechanism.period.seconds)
     # however stiff a mode is, an error of its amplitude holds no more energy than one of its velocity
     bent = [min(a, rate * a / swing) for swing in swings(linkage.mechanism)]
-    return (
-        *first,
-        *bent,
-        *(10.0 * a if angle else a for angle in angles),
-        *second,
-        *(rate * a for _ in bent),
-        *((50.0 if angle else 1.0) * rate * a for angle in angles),
-    )
+    sizes = (10.0 * a if angle else a for angle in angles)
+    speeds = ((50.0 if angle else 1.0) * rate * a for angle in angles)
+    return (*first, *bent, *sizes, *second, *(rate * a for _ in bent), *speeds)
 
 
 def _of_bristles(scene: Scene, period: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -15,6 +15,7 @@ from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, paramete
 from hpcclear.dynamics.planar.tolerances import SMOOTH
 from hpcclear.laws import laws, numbers
 from hpcclear.laws.constant import with_constants
+from hpcclear.laws.declared import JOINT
 from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.scene import Scene
 from hpcclear.scene.contacts.declared import Shape
@@ -34,14 +35,6 @@ OF_RAMP, OF_FORCE = 0.5, 0.003
 def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
-    p = _parameters(scene, points, get)
-    p[:, at.EDGE] = _needed_at_edge(scene, get, p)
-    p = with_waves(scene, get, p) if has_waves(scene) else p
-    return with_further_numbers(scene, get, p) if further_rows(scene) else p
-
-
-def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
-    """But for further numbers of films."""
     p = parameters_of(scene, get, points)
     force = _inertia(scene, get, p)
     for k, contact in zip(scene.open_places, scene.contact_labels(), strict=True):
@@ -51,14 +44,15 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     held = scene.responses_asked() and is_prescribed(scene)
     extremes = held_extremes(scene, points, get.size) if held else np.nan
     p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = extremes
-    return p
+    p[:, at.EDGE] = _needed_at_edge(scene, get, p)
+    p = with_waves(scene, get, p) if has_waves(scene) else p
+    return with_further_numbers(scene, get, p) if further_rows(scene) else p
 
 
 def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
     """Numbers of a contact's shape."""
     key, joint = scene.joint_key(label), scene.clearance_joint(label)
-    shape: Shape = joint.shape(lambda name: get(f"{key}.{name}"))
-    return shape
+    return joint.shape(lambda name: get(f"{key}.{name}"))
 
 
 def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
@@ -72,18 +66,12 @@ def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
         for entry in ("youngs_modulus", "poisson_ratio")
     )
     h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
-    alpha, beta = dundurs(moduli, ratios)
     path = scene.clearance_joint(label).length_path
-    return {
-        "stiffness": sphere_stiffness(h_bearing, h_journal, shape.radius),
-        "compliance": h_bearing + h_journal,
-        "bearing_radius": bearing,
-        "journal_radius": journal,
-        "clearance": clearance,
-        "length": np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}"),
-        "dundurs_alpha": alpha,
-        "dundurs_beta": beta,
-    }
+    length = np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}")
+    stiffness = sphere_stiffness(h_bearing, h_journal, shape.radius)
+    sizes = bearing, journal, clearance, length
+    of_both = dundurs(moduli, ratios)
+    return dict(zip(JOINT, (stiffness, h_bearing + h_journal, *sizes, *of_both), strict=True))
 
 
 def _given(get: Numbers, kind: str, table: Any) -> dict[str, object]:

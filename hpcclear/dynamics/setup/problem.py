@@ -99,14 +99,12 @@ def implicit_method(scene: Scene) -> str:
 
 def _curves_of_rows(scene: Scene, linkage: Linkage) -> tuple[Pieces, ...]:
     """A linkage's curves, in the order of their rows."""
-    driven = {
-        f"{drive.name}.{part}": pieces
-        for drive in linkage.mechanism.drives
-        if isinstance(drive, (PlanarTable, PlanarRunUp))
-        for part, pieces in zip(drive.curves, drive.pieces, strict=True)
-    }
-    tables = curves_of(scene)
-    return tuple(driven[name] if name in driven else tables[name] for name in linkage.curve_rows)
+    known = curves_of(scene)
+    for drive in linkage.mechanism.drives:
+        if isinstance(drive, (PlanarTable, PlanarRunUp)):
+            names = (f"{drive.name}.{part}" for part in drive.curves)
+            known |= zip(names, drive.pieces, strict=True)
+    return tuple(known[name] for name in linkage.curve_rows)
 
 
 def check_objective(scene: Scene) -> None:

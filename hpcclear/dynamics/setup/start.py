@@ -50,7 +50,7 @@ def start_states(
         ended = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
         ended = _statuses(_twins(scene), samples, scene.effects.gravity, planar.rounds_of(scene))
-    _start_contacts(scene, par, points, start)
+    _start_contacts(scene, points, start)
     start.fail(ended)
     return start
 
@@ -119,11 +119,8 @@ def _statuses(loops: Loops | None, samples: Samples, gravity: float, rounds: int
 def _clear(loops: Loops, samples: Samples) -> Booleans:
     """Which samples (m,) are certain to turn."""
     sample = samples.numbers
-    tables: dict[str, object] = {
-        "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
-        "ground": sample.ground, "loads": (),
-    }  # fmt: skip
-    numbers = with_numbers(loops.mechanism, **tables)
+    own = {name: getattr(sample, name) for name in ("bodies", "drives", "ground")}
+    numbers = with_numbers(loops.mechanism, **own, joints=pinned(sample), loads=())
     loops.take(values(numbers))
     main = numbers.period
     seconds: Array = np.broadcast_to(np.asarray(main.seconds, float), len(samples.closed))
@@ -142,7 +139,7 @@ def _without_study(scene: Scene) -> Scene:
     return scene if scene.study is None else scene.with_({"study": None})
 
 
-def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Start) -> None:
+def _start_contacts(scene: Scene, points: Points | None, start: Start) -> None:
     """What starts as deep as its surfaces or deeper starts in contact, at the least impact speed."""
     law = scene.effects.contact
     if law is None or not law.latched:

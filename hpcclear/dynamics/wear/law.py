@@ -24,15 +24,12 @@ from hpcclear.scene.points import Numbers, Points
 class Joints:
     """Worn joints of one life, or of several; arrays of shape (..., joints)."""
 
-    clearance: Array
+    clearance: Array  # when new, m, as the radius
     bearing_radius: Array
-    """clearance and bearing_radius: when new, m."""
-    bearing: Array
+    bearing: Array  # depth of wear for each joule of sliding work, m/J, once run in
     journal: Array
-    """bearing and journal: depth of wear for each joule of sliding work, m/J, once run in."""
-    excess: Array
-    fading: Array
-    """excess and fading: a - 1 and W0, J, of running in; 0 and 1 without."""
+    excess: Array  # a - 1 of running in, 0 without
+    fading: Array  # its W0, J, 1 without
 
     def __getitem__(self, life: object) -> "Joints":
         return Joints(*(array[life] for array in vars(self).values()))

@@ -42,20 +42,15 @@ _SHRINK, _GROW, _SAFETY = 0.2, 4.0, 0.9
 class LifePlan:
     """How lives are followed."""
 
-    cycles: float
-    """Revolutions of a life."""
-    tolerance: float
-    """Of a jump in each clearance and in f, relative."""
-    shortest: float
-    """Revolutions of a jump, at least."""
+    cycles: float  # revolutions of a life
+    tolerance: float  # of a jump in each clearance and in f, relative
+    shortest: float  # revolutions of a jump, at least
+    # simulations at a state of wear: at first, and where intervals are wider than the tolerance allows
     copies: int
     most_copies: int
-    """copies and most_copies: simulations at a state of wear: at first, and where intervals are wider than the tolerance
-    allows."""
+    # what ends a life, by name as of `curves.first_passed`, SI
     limits: Mapping[str, float] = field(default_factory=dict)
-    """What ends a life, by name as of `curves.first_passed`, SI."""
-    beyond: bool = False
-    """Whether lives go on past their thresholds; none goes on once a bearing is worn through."""
+    beyond: bool = False  # whether lives go on past these; none does once a bearing is worn through
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,8 @@ class Relief:
         odd = np.arange(self.size) % 2 == 1
         shapes = np.where(odd[:, None], np.sin(turned), np.cos(turned))
         half = 2 * self.bearing
-        return np.stack(
-            [waves[..., :half] @ shapes[:half], waves[..., half:] @ shapes[half:]], axis=-2
-        )
+        both = waves[..., :half] @ shapes[:half], waves[..., half:] @ shapes[half:]
+        return np.stack(both, axis=-2)
 
     def deepest(self, waves: Array, angles: Array = LOOKED_AT) -> Array:
         """By how much both surfaces together are deeper than on the mean where each is deepest, m, (..., joints)."""

@@ -77,19 +77,15 @@ class SoundingEvaluator:
         self._running = [index for index, _ in taken]
         points = np.array([values for _, values in taken]).reshape(size, -1)
         design = Points(self._columns.names, points, self._columns.paths)
-        return self._recorded(self._running, design)
-
-    def _recorded(self, index: list[int], design: Points) -> Iterator[Records | None]:
-        recording = Recording(
-            self.scene, (), self._perturbations, self.scene.objective, design=design
-        )
+        perturbations, objective = self._perturbations, self.scene.objective
+        recording = Recording(self.scene, (), perturbations, objective, design=design)
         heard = [Heard(self.scene, sample, 1, self._count) for sample in recording.samples]
         for rows in recording.chunks():
             for slot, one in enumerate(heard):
                 one.take(rows[rows[:, rec.SLOT] == slot])
             yield None
         records = recording.record()
-        records["sample"] = index
+        records["sample"] = self._running
         for k, one in enumerate(heard):
             one.end()
             one.enter_levels(records[k : k + 1])

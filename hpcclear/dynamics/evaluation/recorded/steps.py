@@ -106,14 +106,9 @@ class Recording:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        copies: Sequence[int] = (),
-        perturbations: Sequence[int] = (),
-        objective: Objective = MEAN_GAP,
-        beside: Sequence[Scene] = (),
-        design: Points = ITSELF,
-    ) -> None:
+        self, scene: Scene, copies: Sequence[int] = (), perturbations: Sequence[int] = (),
+        objective: Objective = MEAN_GAP, beside: Sequence[Scene] = (), design: Points = ITSELF,
+    ) -> None:  # fmt: skip
         self.problem = problem_of(scene)
         alone = not design.names
         par = [parameters(scene, design), *map(parameters, beside)]
@@ -136,10 +131,8 @@ class Recording:
             scene, design, perturbations=perturbations, objective=objective, recorder=self._lanes
         )
         self._done: list[Records] = []
-        self.samples = [
-            Recorded(self.problem, self._par[k], self._lanes, self._start[k : k + 1])
-            for k in range(kept)
-        ]
+        own = ((self._par[k], self._lanes, self._start[k : k + 1]) for k in range(kept))
+        self.samples = [Recorded(self.problem, *one) for one in own]
 
     def compile(self) -> None:
         """Compile what it runs."""

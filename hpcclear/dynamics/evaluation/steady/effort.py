@@ -63,26 +63,22 @@ class Mean:
     """What was found."""
 
     regime: Regime
-    limit: float
-    """Half-width of the confidence interval of f, m; NaN where there is no steady mean."""
-    outcomes: Outcome
-    """Shape (segments, copies): what the average is made of."""
-    segment: int
-    """Revolutions of each of these."""
-    rtol: float
-    """The looser of the two tolerances, the other one is `STRICTER` times tighter."""
+    limit: float  # half-width of the confidence interval of f, m; NaN where there is no steady mean
+    outcomes: Outcome  # what the average is made of, (segments, copies)
+    segment: int  # revolutions of each of these
+    rtol: float  # the looser of the two tolerances, the other one is `STRICTER` times tighter
     met: bool
     period: int | None = None
-    growth: float = np.nan
-    """Of a perturbation, per revolution: mean of the logarithm, as far as the look showed."""
-    growth_limit: float = np.nan
-    """Half-width of its confidence interval, if it was measured on purpose."""
-    attractors: int | None = None
-    """Kinds of motion found from several starts, if they were looked for."""
+    growth: float = (
+        np.nan
+    )  # of a perturbation, per revolution: mean logarithm, as far as the look showed
+    growth_limit: float = np.nan  # half-width of its confidence interval, if measured on purpose
+    attractors: int | None = (
+        None  # kinds of motion found from several starts, if they were looked for
+    )
     status: Status = Status.OK
-    revolutions: int = 0
+    revolutions: int = 0  # all that were simulated, and their evaluations
     evaluations: float = 0.0
-    """revolutions and evaluations: all that was simulated."""
 
     @property
     def tightest(self) -> float:

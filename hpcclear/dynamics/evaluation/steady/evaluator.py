@@ -9,12 +9,8 @@ from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import RATE, Objective
 from hpcclear.base.outcome import RESPONSES, Flag, Status, failed
-from hpcclear.dynamics.evaluation.evaluator import (
-    DEFAULT_LANES,
-    outcome_records,
-    responses_reported,
-    with_pressures,
-)
+from hpcclear.dynamics.evaluation import evaluator
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.copies import scales
 from hpcclear.dynamics.evaluation.steady.effort import Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.judging import objective
@@ -34,13 +30,6 @@ TURN_SECONDS = 0.02
 
 
 Procedure = Callable[[Sample], Generator[Segment, Outcome, Mean]]
-
-
-def _to_target(scene: Scene) -> Procedure:
-    """The steady mean to the scene's target error."""
-    target, budget = scene.numerics.target_error, scene.numerics.target_revolutions
-    assert target is not None
-    return lambda sample: steady_mean(sample, target, budget)
 
 
 class _Ask:
@@ -66,8 +55,7 @@ class _Ask:
         try:
             self.segment = self.asking.send(outcome)
         except StopIteration as end:
-            mean: Mean = end.value
-            return mean
+            return end.value
         return None
 
     @property
@@ -94,14 +82,11 @@ class SteadyEvaluator:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        columns: Points,
-        lanes: int = DEFAULT_LANES,
-        procedure: Procedure | None = None,
-    ) -> None:
+        self, scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, procedure: Procedure | None = None
+    ) -> None:  # fmt: skip
         check_steady(scene)
-        self._procedure = procedure or _to_target(scene)
+        target, budget = scene.numerics.target_error or 0.0, scene.numerics.target_revolutions
+        self._procedure = procedure or (lambda sample: steady_mean(sample, target, budget))
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
@@ -113,7 +98,7 @@ class SteadyEvaluator:
         self._latched = contact is not None and contact.latched
         problem = self._lanes_of(1e-4, 1).problem  # refuses what cannot be simulated
         self._free = problem.effects.torque is not None
-        self._responses = responses_reported(problem)
+        self._responses = evaluator.responses_reported(problem)
         self._record = record_of(scene, mapped=procedure is not None)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
@@ -153,11 +138,9 @@ class SteadyEvaluator:
         for ask in asks:
             by_kind.setdefault((ask.segment.rtol, ask.segment.revolutions), []).append(ask)
         for kind, group in by_kind.items():
-            self._lanes_of(*kind).queue(
-                np.concatenate([ask.segment.par for ask in group]),
-                Start(np.concatenate([ask.segment.start.rows for ask in group])),
-                np.concatenate([_labels(ask) for ask in group]),
-            )
+            par = np.concatenate([ask.segment.par for ask in group])
+            start = Start(np.concatenate([ask.segment.start.rows for ask in group]))
+            self._lanes_of(*kind).queue(par, start, np.concatenate([*map(_labels, group)]))
 
     def advance(self, seconds: float) -> Records:
         """Work for about `seconds`; return the records of the designs that finished meanwhile."""
@@ -185,7 +168,7 @@ class SteadyEvaluator:
                 del self._asks[sample]
                 about = self._record, self._responses, self.scene.objective
                 record = summed_up(sample, ask.par, mean, *about)
-                yield with_pressures(self.scene, self._columns, [ask.values], record)
+                yield evaluator.with_pressures(self.scene, self._columns, [ask.values], record)
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)
@@ -214,7 +197,7 @@ def summed_up(
     if mean.status != Status.OK:
         return failed(sample, mean.status, int(mean.evaluations), kind)
     labels, each_par = np.zeros(len(rows), np.int64), np.repeat(par, len(rows), axis=0)
-    each = outcome_records(labels, Outcome(rows), each_par, kind, responses, judged)
+    each = evaluator.outcome_records(labels, Outcome(rows), each_par, kind, responses, judged)
     record = each[:1].copy()
     for name in _AVERAGED & {*(kind.names or ())}:
         record[name] = each[name].mean(axis=0)

@@ -39,22 +39,16 @@ def objective(gaps: Array) -> Array:
 class Windows:
     """Averages over the latest revolutions of a few copies, and what they still may be off by, m."""
 
-    period: int | None
-    """Revolutions after which every copy repeats itself, to a quarter of the target; None: none was found."""
-    length: int
-    """Revolutions of the later window: about half of them, whole periods."""
-    gaps: Array
-    """Shape (copies, joints): mean gaps over it."""
-    settling: float
-    """How far the average may still move if it goes on as it did."""
-    moved: float
-    """How far it moved over the latest quarter of the revolutions."""
-    restless: float
-    """How far it moved over that or over the quarter before, the larger of the two."""
-    apart: float
-    """How far the copies' averages are apart, over the latest quarter."""
-    joining: bool
-    """Whether that is much less than over the quarter before."""
+    period: (
+        int | None
+    )  # revolutions after which every copy repeats itself, to a quarter of the target
+    length: int  # revolutions of the later window: about half of them, whole periods
+    gaps: Array  # mean gaps over it, (copies, joints)
+    settling: float  # how far the average may still move if it goes on as it did
+    moved: float  # how far it moved over the latest quarter of the revolutions
+    restless: float  # how far it moved over that or over the quarter before, the larger of the two
+    apart: float  # how far the copies' averages are apart, over the latest quarter
+    joining: bool  # whether that is much less than over the quarter before
 
 
 def period_of(f: Array, tolerance: float) -> int | None:

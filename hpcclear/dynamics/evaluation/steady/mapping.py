@@ -72,7 +72,9 @@ def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Me
         elif revolution == SPIN_UP:
             shadow = _shadows(start[:OWN], sample.scale)
         if len(logs) in LOOKS:
-            growth, limit = _exponent(np.array(logs))
+            # of logarithms (revolutions, copies), in four segments of each copy
+            pieces = [piece.mean(axis=0) for piece in np.array_split(np.array(logs), 4)]
+            growth, _, limit = judging.with_limit(np.concatenate(pieces))
             start = start[:OWN]
             if limit <= sure * max(abs(growth), 1.0) or len(logs) == LOOKS[-1]:
                 break
@@ -112,13 +114,6 @@ def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
     inverse = (shadow.inverse_impact - start.inverse_impact) * (factor * alike)[:, None]
     back.inverse_impact = start.inverse_impact + inverse
     return np.log(np.maximum(distance, 1e-300) / DISTANCE), back
-
-
-def _exponent(logs: Array) -> tuple[float, float]:
-    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies) in four segments of each copy."""
-    pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
-    mean, _, limit = judging.with_limit(pieces)
-    return mean, limit
 
 
 def _judged(

@@ -42,9 +42,8 @@ def in_a_line(record: Any) -> str:
     if np.isfinite(period):
         parts.append(f"period {period:.0f}")
     if regime in (Regime.CHAOTIC, Regime.SEVERAL):
-        parts.append(
-            f"perturbations grow by e^{float(record['lyapunov_exponent']):.2g} per revolution"
-        )
+        exponent = float(record["lyapunov_exponent"])
+        parts.append(f"perturbations grow by e^{exponent:.2g} per revolution")
     parts.append(f"{int(record['steady_revolutions'])} revolutions")
     if not np.isfinite(limit):
         return f"{f:.4g} um, interval not known ({', '.join(parts)})"
@@ -71,10 +70,8 @@ def recorded(scene: Scene, records: Records) -> dict[str, str]:
     if target is None or not scene.clearance_joints():
         return {}
     met, lines = reached(records)
-    return {
-        "target_error_reached": "; missed: ".join([f"{target:g} {met}", *lines[:1]])
-        + "".join(f"; {x}" for x in lines[1:])
-    }
+    missing = f"; missed: {'; '.join(lines)}" if lines else ""
+    return {"target_error_reached": f"{target:g} {met}{missing}"}
 
 
 def in_short(scene: Scene, records: Records) -> str:
