@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.units import UnitError, to_si
 from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
@@ -67,6 +66,8 @@ def run(
 
 def tolerance_of(words: str) -> float:
     """A relative change: 0.01, or 1%. Raises InputError if it is no number."""
+    from hpcclear.base.units import UnitError, to_si  # not for the list of commands
+
     try:
         return float(words)
     except ValueError:
