@@ -13,8 +13,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics, Move, Mover
 from hpcclear.dynamics.linkage.parts import GROUND, Body, is_joint, places_of, split
 from hpcclear.dynamics.linkage.trees import Forest
 
-Held = tuple[str, Vector]
-"""A vector held in a frame."""
+Held = tuple[str, Vector]  # a vector held in a frame
 
 
 class Pull(NamedTuple):
@@ -50,11 +49,6 @@ class Balance:
         """Mass of a body."""
         return self.writer.parameter(f"{body.name}_mass")
 
-    def inertia_of(self, body: Body) -> Term:
-        """Inertia of a body about its mass centre, or about its pin if it hangs on the ground."""
-        about = "pivot_inertia" if self.forest.on_ground(body.name) else "inertia"
-        return self.writer.parameter(f"{body.name}_{about}")
-
     def moment_of(self, body: Body) -> Vector:
         """Mass times the arm from the ground's pin to the mass centre."""
         own = split(self.forest.hangs[body.name].own)[1]
@@ -71,7 +65,8 @@ class Balance:
         for body in self.forest.mechanism.bodies:
             turns = Mover("angle", self.forest.frames[body.name])
             if first == second == turns:
-                total = total + self.inertia_of(body)
+                about = "pivot_inertia" if self.forest.on_ground(body.name) else "inertia"
+                total = total + self.writer.parameter(f"{body.name}_{about}")
             if self.forest.on_ground(body.name):
                 continue
             columns = self.kinematics.columns(self.kinematics.center(body.name))

@@ -50,8 +50,7 @@ def motion(effects, lanes, tables, W):
     accelerations(effects, work, par, carray(tables, at.MAX_CURVES), W)
 '''
 
-BANK = 8
-"""Lanes of an implicit step's motion."""
+BANK = 8  # lanes of an implicit step's motion
 
 
 def _look_up(curve: int, one: LookUp) -> str:

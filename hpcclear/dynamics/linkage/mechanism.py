@@ -159,10 +159,8 @@ def _places(m: Mechanism) -> None:
         for entry in ("body", "other", "angle_of"):
             acted_on = getattr(one, entry, None)
             if acted_on is not None and acted_on not in known.keys() - {GROUND}:
-                raise InputError(
-                    f"{key}.{entry}", acted_on, "there is no such moving body",
-                    f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
-                )  # fmt: skip
+                remedy = f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}"
+                raise InputError(f"{key}.{entry}", acted_on, "there is no such moving body", remedy)
     _turned(m)
     for joint in m.joints:
         first, second = (parts.split(place)[0] for place in parts.places_of(joint))
@@ -171,15 +169,13 @@ def _places(m: Mechanism) -> None:
                 f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
             )
         if joint.kind == "fixed" and second != GROUND:
-            raise InputError(
-                f"joints.{joint.name}.line", joint.line, "a body can be fixed to the ground only",
-                "Name a point of the ground, or make one body of the two",
-            )  # fmt: skip
+            reason = "a body can be fixed to the ground only"
+            remedy = "Name a point of the ground, or make one body of the two"
+            raise InputError(f"joints.{joint.name}.line", joint.line, reason, remedy)
         if joint.kind == "slide" and first == GROUND:
-            raise InputError(
-                f"joints.{joint.name}.point", joint.point, "the ground cannot be the sliding body",
-                "Swap point and line",
-            )  # fmt: skip
+            reason = "the ground cannot be the sliding body"
+            remedy = "Swap point and line"
+            raise InputError(f"joints.{joint.name}.point", joint.point, reason, remedy)
 
 
 def coupled(m: Mechanism) -> list[set[str]]:

@@ -13,8 +13,7 @@ from hpcclear.base.terms import Acting, Term
 
 GROUND = "ground"
 Pair = tuple[float, float]
-Number = float | Array
-"""One number, or those of samples (m,)."""
+Number = float | Array  # one number, or those of samples (m,)
 
 
 class TableRow(Protocol):

@@ -20,22 +20,18 @@ from hpcclear.dynamics.linkage.loops import Loops, State
 
 LONGEST = 2 * math.pi / 72.6
 """Step of the walk at most, rad of the drive; no whole part of a turn, so that change points are seldom met."""
-SHORTEST = 1e-8
-"""And at least: what needs shorter ones has come to a dead centre."""
+SHORTEST = 1e-8  # and at least: what needs shorter ones has come to a dead centre
 FARTHEST, TURNED = 0.02, 0.1
 """How far Newton may go from where a step was to end, and by how much a step may change a velocity times its length (rad, or
 of the typical length)."""
 POOR = 1e-2
 """Smallest singular value over the largest seen, from which on a longer step is tried that passes a change point at once."""
-FAST = 100.0
-"""Velocity, rad (or typical lengths) per rad of the drive, from which on the end of a walk is a dead centre."""
+FAST = 100.0  # velocity, rad (or typical lengths) per rad of the drive, from which on the end of a walk is a dead centre
 BESIDE = 0.01
 """Of a change point, rad of the drive: nearer to it numbers are interpolated, since forces lose digits with the fourth power of
 the distance (1e-8 of them there)."""
-NEARER = 4.0
-"""By how much nearer than `BESIDE` a change point is looked at as well."""
-CLEAR = 1e-2
-"""Smallest singular value over the largest in `clear`, at least."""
+NEARER = 4.0  # by how much nearer than `BESIDE` a change point is looked at as well
+CLEAR = 1e-2  # smallest singular value over the largest in `clear`, at least
 MOST_ROUNDS = 64
 _NEWTON = 8
 

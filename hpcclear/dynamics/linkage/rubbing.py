@@ -18,8 +18,7 @@ from hpcclear.dynamics.linkage.expression import Writer, onto
 from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.parts import GROUND, Joint, is_joint, is_pin, places_of, split
 
-PASSES = 4
-"""Of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars."""
+PASSES = 4  # of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars
 
 
 class Solving(Protocol):

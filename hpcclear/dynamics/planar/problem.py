@@ -16,7 +16,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.loops import largest_distance
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, massless, turning
-from hpcclear.dynamics.linkage.parts import GROUND, Number, split
+from hpcclear.dynamics.linkage.parts import GROUND, split
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import Walk, changes, passage, refused
@@ -185,7 +185,9 @@ def parameters_of(scene: Scene, get: Numbers, points: Points | None) -> Array:
     p[:, at.PERIOD] = period
     p[:, at.SPEED] = at.TURN * turns / period
     p[:, at.FIRST_STEP] = 1e-3 * period / turns
-    p[:, at.TURN_END] = start_of_turns(sample, linkage.cartesian) + at.TURN * turns
+    driven = sample.period.body  # whose angle begins there as a coordinate
+    start = sample.body(driven).start_angle - forest(sample, linkage.cartesian).offsets[driven]
+    p[:, at.TURN_END] = start + at.TURN * turns
     p[:, at.DRIVEN_LENGTH] = driven_length(sample)
     n = scene.numerics
     linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
@@ -207,12 +209,6 @@ def sample_of(scene: Scene, points: Points | None) -> Mechanism:
 
 
 _LAST: list[tuple[Scene, Points, Mechanism]] = []
-
-
-def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Number:
-    """Return the start of the angle that the period's body has as a coordinate, rad; of samples, (m,)."""
-    body = mechanism.period.body
-    return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 
 
 def driven_length(mechanism: Mechanism) -> Array:

@@ -13,15 +13,13 @@ from hpcclear.base.jit import FASTMATH, apart, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import RunSettings
 
-SHRINK = 0.2
-"""What a rejected step shrinks to at most."""
+SHRINK = 0.2  # what a rejected step shrinks to at most
 
 _LOG_SAFETY = -0.152003  # log2(0.9)
 _LOG_SHRINK = math.log2(SHRINK)
 _LOG_GROW = 3.321928  # and grows tenfold
 
-FIRST_PART = 0.1
-"""Depth at the start of a step over that at its end below which it is a contact's first step."""
+FIRST_PART = 0.1  # depth at the start of a step over that at its end below which it is a contact's first step
 
 
 @apart
@@ -49,12 +47,10 @@ def choose_step(rules, work, par, W):
             work[at.STEP * W + i] = h
 
 
-ROW_REACH = 1e-7
-"""Part of a step that a row of a table may stand from its end: a corner of the load there does no harm."""
+ROW_REACH = 1e-7  # part of a step that a row of a table may stand from its end: a corner of the load there does no harm
 
 
-ROUNDED = 1e-15
-"""Of a place, which is a number of lengths before whole ones are taken off."""
+ROUNDED = 1e-15  # of a place, which is a number of lengths before whole ones are taken off
 
 
 @lane_function
@@ -308,17 +304,6 @@ def commit_peak(work, i, W):
 
 
 @lane_function
-def commit_coordinate(work, stages, k, i, W):
-    """Coordinate k, its velocity and its acceleration after a step."""
-    yes = work[at.ACCEPT * W + i] == 1.0
-    keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
-    keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
-    new = work[(at.ACC + k) * W + i]
-    old = stages[k * W + i]
-    stages[k * W + i] = new if yes else old
-
-
-@lane_function
 def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     commit_measures(effects, work, W)
@@ -335,7 +320,10 @@ def commit(effects, work, stages, n, W):
     for number in range(n):
         k = coordinate(number)
         for i in range(W):
-            commit_coordinate(work, stages, k, i, W)
+            yes = work[at.ACCEPT * W + i] == 1.0
+            keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
+            keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
+            keep(stages, k, work[(at.ACC + k) * W + i], yes, i, W)
     ended = 0.0
     for i in range(W):
         accept = work[at.ACCEPT * W + i]

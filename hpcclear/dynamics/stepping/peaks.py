@@ -14,8 +14,7 @@ from hpcclear.dynamics.stepping.stops import hermite, hermite_integral, interior
 NEAR = 1.2
 """A peak above so many times the larger value at the ends of a step is not found: it would be a step that resolves nothing."""
 
-TURNS = 4
-"""Of false position: the force is flat at its peak, where it stands matters little."""
+TURNS = 4  # of false position: the force is flat at its peak, where it stands matters little
 
 
 @lane_function

@@ -62,21 +62,15 @@ def add_waves(work, p, angle, first, count, i, W):
 
 
 @lane_function
-def keep_angle(work, angle, i, W):
-    """The angle that the next step starts at."""
-    yes = work[at.ACCEPT * W + i] == 1.0
-    keep(work, at.RATE_OLD + angle, work[(at.RATE_NOW + angle) * W + i], yes, i, W)
-    keep(work, at.RATE_OLD + angle + 1, work[(at.RATE_NOW + angle + 1) * W + i], yes, i, W)
-
-
-@lane_function
 def add_surface(work, p, angle, first, count, W):
     """Integrals of a surface's profile after a step."""
     if count > 0:
         for i in range(W):
             add_waves(work, p, angle, first, count, i, W)
-        for i in range(W):
-            keep_angle(work, angle, i, W)
+        for i in range(W):  # the angle that the next step starts at
+            yes = work[at.ACCEPT * W + i] == 1.0
+            for row in (angle, angle + 1):
+                keep(work, at.RATE_OLD + row, work[(at.RATE_NOW + row) * W + i], yes, i, W)
 
 
 @lane_function

@@ -21,8 +21,7 @@ SQUARE = at.place(at.FOLLOWED_SQUARE)
 ACROSS = at.place(at.FOLLOWED_ACROSS)
 
 
-STRICT = 1e-6
-"""Relative tolerance of explicit steps that is never made stricter at the edge of stability."""
+STRICT = 1e-6  # relative tolerance of explicit steps that is never made stricter at the edge of stability
 
 OF_INERTIA = 0.02
 """Error of a film's force in an explicit step at most, over the forces of inertia: implicit steps take over at the edge of

@@ -16,16 +16,7 @@ from hpcclear.dynamics.stepping import stops
 from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 
-NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION = range(3)
-"""What may be requested."""
-
-
-@scalar_function
-def change_sample(lane, W, n, status, block, queue, settings):
-    """Write down a lane's sample, if its status is one, and give it the next."""
-    if status != UNFINISHED:
-        finish(lane, W, n, status, block, queue, settings)
-    load(lane, W, n, block, queue, settings)
+NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION = range(3)  # what may be requested
 
 
 @scalar_function
@@ -61,12 +52,15 @@ def answer(numbers, rules, block, queue, settings, tables):
         status = end_of_step(rules, lane, W, n, block, settings, tables)
         ends = status != OK
     elif asked == END_OF_REVOLUTION:
-        stops.wrap_angles(lane, W, n, block.work, settings)
+        for k in range(n):  # angles that go round with the revolutions keep their precision
+            block.work[(at.Q + k) * W + lane] -= settings[RunSettings.wraps + k]
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
     before = block.work[at.RUNNING * W + lane]
     if ends:
-        change_sample(lane, W, n, status, block, queue, settings)
+        if status != UNFINISHED:
+            finish(lane, W, n, status, block, queue, settings)
+        load(lane, W, n, block, queue, settings)
     numbers[Asking.FOUND] = int(block.work[at.RUNNING * W + lane] - before)
 
 

@@ -14,8 +14,7 @@ from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 OK = int(Status.OK)
 STALLED = int(Status.STALLED)
 
-LONG_AT_REST = 1e3
-"""Periods after which a body that starts from rest and does not turn has stalled."""
+LONG_AT_REST = 1e3  # periods after which a body that starts from rest and does not turn has stalled
 
 
 KINK_REACH = 1e-3
@@ -269,10 +268,3 @@ def stop_free_crank(lane, W, block, settings, last):
         fraction = impact_fraction(before, m0, beyond, m1, 0.0)
         cut(lane, W, work, fraction)
     return OK
-
-
-@lane_event
-def wrap_angles(lane, W, n, work, settings):
-    """Count angles that go round with the revolutions anew with each, so that they keep their precision."""
-    for k in range(n):
-        work[(at.Q + k) * W + lane] -= settings[RunSettings.wraps + k]

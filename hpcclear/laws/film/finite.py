@@ -20,8 +20,7 @@ from hpcclear.laws.reynolds import along_and_across, short_impedance, turned_aga
 LEAST_S = 0.19899748742132398
 """s at an eccentricity of 0.98, up to which finite bearings are fitted."""
 
-SHORT_TO = 1.5
-"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
+SHORT_TO = 1.5  # length over diameter up to which a short film is nearer to the finite one, and from which a long one
 
 DEGREES = (5, 14)  # in s, in sin(psi/2)
 _MODES, _ACROSS, _AROUND = 32, 64, 2048
@@ -107,15 +106,11 @@ def correction(ratio: float) -> Array:
 def _in_powers(fitted: Array) -> Array:
     """Coefficients of Chebyshev's polynomials as those of powers, in both variables."""
     for axis, degree in enumerate(DEGREES):
-        powers = np.array([_powers_of(k, degree) for k in range(degree + 1)])
+        units = (np.eye(k + 1)[k] for k in range(degree + 1))
+        each = map(np.polynomial.chebyshev.cheb2poly, units)
+        powers = np.array([np.pad(one, (0, degree + 1 - len(one))) for one in each])
         fitted = np.moveaxis(np.tensordot(fitted, powers, (axis, 0)), -1, axis)
     return fitted
-
-
-def _powers_of(k: int, degree: int) -> Array:
-    """Coefficients of Chebyshev's polynomial k, shape (degree + 1,)."""
-    one = np.polynomial.chebyshev.cheb2poly(np.eye(k + 1)[k])
-    return np.pad(one, (0, degree + 1 - len(one)))
 
 
 @lane_function

@@ -72,11 +72,6 @@ def simpler(values, gentle):
     yield "sticking in joints", coulomb
 
 
-def no_ramp():
-    """Bristles hold at any speed."""
-    return 0.0
-
-
 LAW = FrictionLaw(
     words="LuGre's bristles, which stick",
     source="Canudas de Wit and others 1995, doi:10.1109/9.376053",
@@ -107,8 +102,8 @@ LAW = FrictionLaw(
     ratio=ratio,
     deflection=deflection,
     largest=largest,
-    inverse_ramp=no_ramp,
-    steepness=no_ramp,
+    inverse_ramp=lambda: 0.0,  # bristles hold at any speed
+    steepness=lambda: 0.0,
     check=check,
     simpler=simpler,
     elsewhere=dict.fromkeys(

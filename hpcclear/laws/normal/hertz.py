@@ -4,11 +4,6 @@ from hpcclear.laws.declared import ContactLaw
 from hpcclear.laws.hertz_contact import HERTZIAN
 
 
-def no_damping():
-    """None."""
-    return 0.0
-
-
 def factor():
     """Nothing but the elastic part."""
     return 1.0
@@ -20,5 +15,5 @@ LAW = ContactLaw(
     formula="K d^1.5",
     valid="small contacts: up to 30 degrees to either side",
     factor=factor,
-    **{**HERTZIAN, "damping": no_damping, "without_loss": ""},
+    **{**HERTZIAN, "damping": lambda: 0.0, "without_loss": ""},
 )

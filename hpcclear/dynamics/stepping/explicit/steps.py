@@ -97,13 +97,6 @@ def sense_stiffness(step, stages, W):
 
 
 @lane_function
-def begin_stage(work, c, W):
-    """Time of this stage within the revolution."""
-    for i in range(W):
-        work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
-
-
-@lane_function
 def start_state(work, n, W):
     """The start of the step as a stage, for lanes whose accelerations there are not known yet."""
     for number in range(n):
@@ -130,19 +123,11 @@ def adopt_fresh(effects, work, stages, n, W):
 
 
 @lane_function
-def weigh_rate(work, rate, first, row, b, i, W):
-    """Add a stage's rate to the sum that becomes its integral over the step."""
-    before = work[(at.RATE_SUM + rate) * W + i]
+def weigh(work, sums, rate, first, row, weight, i, W):
+    """Add a stage's rate, weighted, to a sum over the step: that of its integral, or of the error of that."""
+    before = work[(sums + rate) * W + i]
     before = 0.0 if first else before
-    work[(at.RATE_SUM + rate) * W + i] = before + b * work[(row + rate) * W + i]
-
-
-@lane_function
-def weigh_error(work, first, row, e, i, W):
-    """Add a stage's gap to the sum that becomes the error of its integral."""
-    before = work[(at.RATE_ERROR + at.GAP) * W + i]
-    before = 0.0 if first else before
-    work[(at.RATE_ERROR + at.GAP) * W + i] = before + e * work[(row + at.GAP) * W + i]
+    work[(sums + rate) * W + i] = before + weight * work[(row + rate) * W + i]
 
 
 @lane_function
@@ -157,13 +142,13 @@ def weigh_rates(effects, work, first, row, b, e, lanes, W):
     if (b != 0.0) | (e != 0.0):
         for k in range(place(effects.rules.end - 1 - begin) * W + W):
             i = begin * W + k
-            weigh_rate(work, at.GAP, first, row, b, i, W)
-            weigh_error(work, first, row, e, i, W)
+            weigh(work, at.RATE_SUM, at.GAP, first, row, b, i, W)
+            weigh(work, at.RATE_ERROR, at.GAP, first, row, e, i, W)
     if b != 0.0:
         for r in range(len(effects.measures)):
             rate = measure(effects, r)
             for i in range(lanes):
-                weigh_rate(work, rate, first, row, b, i, W)
+                weigh(work, at.RATE_SUM, rate, first, row, b, i, W)
 
 
 @lane_function
@@ -194,7 +179,9 @@ def take_explicit_steps(effects, observing, motion, step, tables, senses, stages
             start_state(work, step.n, W)
         else:
             any_stage_state(step, s, stages, W)
-        begin_stage(work, weights[tab.NODES + s], W)
+        c = weights[tab.NODES + s]
+        for i in range(W):
+            work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
         run_observed(observing, motion, work, tables)
         if s == 0:
             adopt_fresh(effects, work, step.stages, step.n, W)

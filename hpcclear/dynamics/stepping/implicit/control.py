@@ -18,20 +18,15 @@ CHEAP_CONTRACTION, KEPT_TO = 0.002, 1.2
 BEST_RATE = 0.3
 """Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
 
-SLOPE_MEMORY = 0.5
-"""How much of that rate is still believed after a step that one iteration solved."""
-
-FAILED_SHRINK = 0.1
-"""At most, after the iteration failed."""
+SLOPE_MEMORY = 0.5  # how much of that rate is still believed after a step that one iteration solved
+FAILED_SHRINK = 0.1  # at most, after the iteration failed
 
 CEILING, CEILING_GROWTH = 0.6, 1.05
 """Of the failed step, for those after it; and how that is forgotten, step by step."""
 
-CALM_STIFFNESS = 2.0
-"""h |J| below which the explicit method would do."""
+CALM_STIFFNESS = 2.0  # h |J| below which the explicit method would do
 
-STEEP = 100.0
-"""s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are."""
+STEEP = 100.0  # s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are
 
 ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
 """Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
@@ -48,8 +43,7 @@ KINK_REACH, MOST_CUTS = 0.005, 12.0
 
 MAX_ITERATIONS = 10
 
-NEWTON_TOLERANCE = 0.005
-"""Of the tolerance on the step's error: the energy balance closes no better than the iteration."""
+NEWTON_TOLERANCE = 0.005  # of the tolerance on the step's error: the energy balance closes no better than the iteration
 
 STEP_SAFETY = 0.9
 LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0

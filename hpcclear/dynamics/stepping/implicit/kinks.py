@@ -12,14 +12,12 @@ from hpcclear.dynamics.stepping.control import place
 from hpcclear.dynamics.stepping.implicit import memory as mem
 from hpcclear.dynamics.stepping.implicit.radau import BASIS, NODES
 
-BEYOND = 1e-4
-"""How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
+BEYOND = 1e-4  # how far beyond a kink a step ends, in units of the kink's function (of order 1)
 
 GUESSED_BEYOND = 0.03
 """A guess shows a kink where a stage is so far beyond it; the solution shows whether a nearer one is real."""
 
-NEAR = 5e-4
-"""A kink this near the start of a step, in these units, is stepped over."""
+NEAR = 5e-4  # a kink this near the start of a step, in these units, is stepped over
 
 GAP_UNIT = 0.1
 """Of the clearance: the unit in which the gap, whose sign is a kink too, is of order 1."""
