@@ -17,11 +17,9 @@ from hpcclear.dynamics.evaluation.recorded import steps
 from hpcclear.dynamics.evaluation.recorded.impacts import measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import Heard, instants_of
 from hpcclear.dynamics.evaluation.steady.wording import recorded
+from hpcclear.dynamics.planar import response as planar
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
-from hpcclear.dynamics.planar.response import labels as planar_labels
-from hpcclear.dynamics.planar.response import pins_of, wound_up
-from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integrator_of, problem_of
@@ -39,8 +37,7 @@ from hpcclear.scene.scene import record_of
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST = 0.5
-"""Share of the machine's memory that the time series of a response may take."""
+MOST = 0.5  # share of the machine's memory that the time series of a response may take
 
 
 def simulate(
@@ -138,8 +135,7 @@ def kernel_of(scene: Scene) -> tuple[object, ...] | None:
     return (*motions, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())
 
 
-Found = tuple[Array, dict[str, Array], Records]
-"""Instants, time series and outcome record (1,)."""
+Found = tuple[Array, dict[str, Array], Records]  # instants, time series and outcome record (1,)
 
 
 def _response(
@@ -176,19 +172,18 @@ def _response(
     )
 
 
-_COUNTED = ("revolution", "order", "band")
-"""Coordinates of measures of impact and noise."""
+_COUNTED = ("revolution", "order", "band")  # coordinates of measures of impact and noise
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]]:
     """Labels along what a linkage's series have besides time and joints."""
-    found = planar_labels(scene, linkage_of(scene).mechanism)
+    found = planar.labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
         found["mode"] = scene.mode_labels
     if scene.guides():
         found["guide"] = scene.guides()
     if not scene.modes:
-        found["pin"] = pins_of(linkage_of(scene).mechanism)
+        found["pin"] = planar.pins_of(linkage_of(scene).mechanism)
     return found
 
 
@@ -205,7 +200,7 @@ def _reason(scene: Scene, data: dict[str, Array]) -> dict[str, str | int]:
     refusal = refused_of(scene)
     if refusal is not None:
         return {"ended": refusal[1].reason}
-    cautions = (*cautions_of(scene), *wound_up(linkage_of(scene).mechanism, data))
+    cautions = (*cautions_of(scene), *planar.wound_up(linkage_of(scene).mechanism, data))
     return {"cautions": "\n".join(cautions)} if cautions else {}
 
 
@@ -272,7 +267,7 @@ class Collected(Heard):
         count = self.scene.output.instants_per_revolution
         seen, first = steps.seen_between(self.sample, piece, works=True), self.scene.bristles
         seen = seen._replace(q=seen.q[:, first:], v=seen.v[:, first:])
-        series = {"time": piece.times, **planar_series(self.scene, self.sample.par, seen)}
+        series = {"time": piece.times, **planar.series(self.scene, self.sample.par, seen)}
         if not self._taken:
             self._began = float(series["energy_residual"][0])
         self._taken += len(piece.times)

@@ -7,8 +7,7 @@ from hpcclear.scene import Scene
 IN_MEMORY = 4.0
 """Memory over what is stored, about: 0.69 GB for a file of 169 MB, of 1000 revolutions of one slider-crank."""
 
-LARGE = 5e7
-"""Bytes of a file from which on its size is printed before a simulation."""
+LARGE = 5e7  # bytes of a file from which on its size is printed before a simulation
 
 
 def kept_revolutions(scene: Scene) -> int:

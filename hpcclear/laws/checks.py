@@ -27,14 +27,10 @@ RATES = np.array([-10.0, -1.0, -0.1, -1e-3, 0.0, 1e-3, 0.1, 1.0, 10.0])
 IMPACT_SPEEDS = np.array([1e-3, 0.1, 1.0, 10.0])
 SPEEDS = np.concatenate([-np.logspace(2, -7, 40), [0.0], np.logspace(-7, 2, 40)])
 
-TOUCHING = 1e-6
-"""Force at no depth, as a part of that at the largest depth tried, up to which it counts as none."""
+TOUCHING = 1e-6  # force at no depth, as a part of that at the largest depth tried, up to which it counts as none
 
-ROUNDING = 1e-9
-"""Relative, of a force at opposite rates that counts as the same."""
-
-SAME = 1e-4
-"""Relative, of slopes by differences."""
+ROUNDING = 1e-9  # relative, of a force at opposite rates that counts as the same
+SAME = 1e-4  # relative, of slopes by differences
 
 
 _PAIRS = {
@@ -115,8 +111,7 @@ def check_shape(law: Law) -> None:
 
 
 # ---- numbers with units, as Pint has them: what functions are run on to check their units ----------
-Quantity = Any
-"""Of Pint, which has no types here, or a plain number."""
+Quantity = Any  # of Pint, which has no types here, or a plain number
 
 
 @lru_cache(maxsize=1)

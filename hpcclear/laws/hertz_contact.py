@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 from hpcclear.base.arrays import Array
 from hpcclear.laws.declared import ContactLaw, Function, Parameter
 
-Number = TypeVar("Number", float, Array)
-"""A float, or an array of them."""
+Number = TypeVar("Number", float, Array)  # a float, or an array of them
 
 
 def reduced_compliance(youngs_modulus: Number, poisson_ratio: Number) -> Number:

@@ -19,8 +19,7 @@ from hpcclear.base.generated import run_text
 REFERENCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,39}):([A-Za-z_][A-Za-z0-9_]{0,79})")
 """``"module:Name"``."""
 
-SCIPY = "scipy"
-"""In place of a module: what scipy.stats has."""
+SCIPY = "scipy"  # in place of a module: what scipy.stats has
 
 
 class _Reading(NamedTuple):

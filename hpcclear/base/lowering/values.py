@@ -15,8 +15,7 @@ Flags: TypeAlias = Collection[str]
 
 DOUBLE, WHOLE, TRUTH = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 VECTOR = ir.VectorType(DOUBLE, EIGHT)
-ORDER = [TRUTH, WHOLE, DOUBLE, VECTOR]
-"""Types of numbers, each of which holds those before."""
+ORDER = [TRUTH, WHOLE, DOUBLE, VECTOR]  # types of numbers, each of which holds those before
 
 
 class Array(NamedTuple):
@@ -45,8 +44,7 @@ class Kind(NamedTuple):
     parts: tuple[Value, ...] = ()
 
 
-DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())
-"""Places of numbers in memory."""
+DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())  # places of numbers in memory
 
 
 def is_known(value: Value) -> bool:

@@ -34,8 +34,7 @@ CACHE_OF_A_VECTOR = 12 * 1024
 """Bytes of the first-level cache for each of them: in 32 KiB 16 lanes take 0.84 of the time of 32, whose states, stages and
 parameters do not fit."""
 
-LEAST_LANES = 16
-"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
+LEAST_LANES = 16  # shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap
 
 
 def default_lanes() -> int:
@@ -53,11 +52,8 @@ def default_lanes() -> int:
     return int(asked)
 
 
-DEFAULT_LANES = default_lanes()
-"""Lanes of an ensemble in this process; root's are everybody's."""
-
-PERTURBATION = 1e-10
-"""Relative size of the perturbations to the start of a sample's copies."""
+DEFAULT_LANES = default_lanes()  # lanes of an ensemble in this process; root's are everybody's
+PERTURBATION = 1e-10  # relative size of the perturbations to the start of a sample's copies
 
 PERTURBATIONS = (0, 1, -1)
 """Signs of the perturbations to copies of a response at a tight tolerance."""
@@ -80,8 +76,7 @@ def alone(rtol: float) -> tuple[int, ...]:
 STRICTER = 300.0
 """Tolerance of a sample over that of its copies, whose own errors then count for little."""
 
-TIGHTEST = 1e-14
-"""Tolerance of a copy at least: beyond it all is rounding."""
+TIGHTEST = 1e-14  # tolerance of a copy at least: beyond it all is rounding
 
 COVERAGE = 1.7
 """Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
@@ -254,8 +249,7 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     return record
 
 
-NO_RATE = -1e299
-"""A place whose largest rate is below this has none."""
+NO_RATE = -1e299  # a place whose largest rate is below this has none
 
 
 def outcome_records(

@@ -32,8 +32,7 @@ PLACES = (1 << 32) - 1
 """All bits of a place in the array: taken with it, the compiler sees that it is not below 0."""
 
 MOST_INTERVALS = 1 << 16
-FEW_INTERVALS = 4096
-"""So many are tried at least before there are halvings."""
+FEW_INTERVALS = 4096  # so many are tried at least before there are halvings
 
 
 def packed(

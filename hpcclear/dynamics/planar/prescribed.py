@@ -28,11 +28,8 @@ from hpcclear.scene.driving import PlanarTable
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
-BEND = 1e-6
-"""Part of a table's range from which on a sum is cut where no cubic follows it."""
-
-PER_REVOLUTION = 720
-"""Instants of a revolution, if no number is requested."""
+BEND = 1e-6  # part of a table's range from which on a sum is cut where no cubic follows it
+PER_REVOLUTION = 720  # instants of a revolution, if no number is requested
 
 _FIVE, _OF_FIVE = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (_FIVE + 1.0), 0.5 * _OF_FIVE  # on [0, 1]

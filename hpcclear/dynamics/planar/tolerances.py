@@ -13,8 +13,7 @@ SMOOTH = 1e-299
 """Steepness of a film that bounds no step: with bristles, too, implicit steps go by the exponent of smooth motions. That halves
 them, and leaves f within some 1e-7 and the energy balance within 1e-7 at rtol 1e-6."""
 
-LENGTH = 1e-3
-"""m; what the absolute tolerance of lengths refers to."""
+LENGTH = 1e-3  # m; what the absolute tolerance of lengths refers to
 
 STIFF = 2e4
 """Radians that the fastest mode swings in a revolution, from which "auto" takes implicit steps.

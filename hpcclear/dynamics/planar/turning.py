@@ -29,11 +29,8 @@ NARROW = 5e-3
 changes within so small a part of a turn that steps, or the nodes that works are summed over, pass over it. For a slider-crank
 it is the cosine of the rod's steepest angle: at 6e-3 works at a given speed close to 1e-5."""
 
-CLOSED = 1e-14
-"""Of the size of a linkage: by how much loops are open where they close to rounding."""
-
-NEAR_CHANGE = 0.1
-"""Of a change point, rad of the drive: poses nearer to it are on its way."""
+CLOSED = 1e-14  # of the size of a linkage: by how much loops are open where they close to rounding
+NEAR_CHANGE = 0.1  # of a change point, rad of the drive: poses nearer to it are on its way
 
 
 def without_clearance(mechanism: Mechanism) -> Mechanism:
@@ -72,8 +69,7 @@ def twin_of(mechanism: Mechanism) -> Mechanism | None:
     return None if freedom(twin) else twin
 
 
-Walk = tuple[Assembly, Passage]
-"""Of a linkage put together, through its revolutions."""
+Walk = tuple[Assembly, Passage]  # of a linkage put together, through its revolutions
 
 
 def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:

@@ -205,8 +205,7 @@ SAME_LENGTH = 0.01
 wider."""
 
 
-RAMP = 0.1
-"""Of a threshold of wear, relative: beyond it by so much, all of the force wears."""
+RAMP = 0.1  # of a threshold of wear, relative: beyond it by so much, all of the force wears
 
 
 def parameter_rows(scene: Scene) -> int:

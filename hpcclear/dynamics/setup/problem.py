@@ -24,8 +24,7 @@ IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
 
-STIFF_DAMPING = 10.0
-"""Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""
+STIFF_DAMPING = 10.0  # fixed damping factor in s/m, or coefficient of a law with restitution, from which it does
 
 
 def coordinate_count(scene: Scene) -> int:

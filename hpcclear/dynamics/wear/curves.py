@@ -12,14 +12,10 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.relief import FLAT, LOOKED_AT, Relief
 
-FINE = 1000
-"""Parts of a jump in which the curves are straight where a limit is looked for."""
+FINE = 1000  # parts of a jump in which the curves are straight where a limit is looked for
 
-THROUGH = "worn_through"
-"""The limit that every life has: the clearance at which a bearing counts as worn through."""
-
-DEEPEST = 0.25
-"""Largest clearance around a joint, over the radius of its bearing when new, at which that is."""
+THROUGH = "worn_through"  # the limit that every life has: the clearance at which a bearing counts as worn through
+DEEPEST = 0.25  # largest clearance around a joint, over the radius of its bearing when new, at which that is
 
 
 @dataclass(frozen=True)

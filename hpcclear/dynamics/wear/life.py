@@ -26,11 +26,8 @@ from hpcclear.dynamics.wear.curves import THROUGH, Life, WearState, first_passed
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 
-FIRST_GROWTH = 0.1
-"""Of the clearance, relative, by the first jump."""
-
-MOST_GROWTH = 0.5
-"""By any jump."""
+FIRST_GROWTH = 0.1  # of the clearance, relative, by the first jump
+MOST_GROWTH = 0.5  # by any jump
 
 BEYOND = 1.05
 """Of the revolutions to the end of a life, at the rate of its state: a jump goes there, so that the end lies within it."""

@@ -117,8 +117,7 @@ def measured_of(
     return result
 
 
-LEAST = 720
-"""Instants a revolution by which forces are taken densely at least."""
+LEAST = 720  # instants a revolution by which forces are taken densely at least
 
 
 class Spectra:

@@ -20,11 +20,8 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of
 from hpcclear.statistics import spectra
 
-FEWEST_INSTANTS = 64
-"""Instants a revolution from which on there are spectra."""
-
-LARGEST_COUNT = 100_000
-"""Instants a revolution that a band may take."""
+FEWEST_INSTANTS = 64  # instants a revolution from which on there are spectra
+LARGEST_COUNT = 100_000  # instants a revolution that a band may take
 
 
 class SoundingEvaluator:

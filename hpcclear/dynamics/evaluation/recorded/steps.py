@@ -31,14 +31,9 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of
 
-ITSELF = Points((), np.empty((1, 0)), ())
-"""A scene as its only design."""
-
-CHUNK = 8192
-"""Accepted steps between two visits to the stepper."""
-
-LEAST_KEPT = 1 << 16
-"""Steps of an unfinished revolution that are held before any is dropped."""
+ITSELF = Points((), np.empty((1, 0)), ())  # a scene as its only design
+CHUNK = 8192  # accepted steps between two visits to the stepper
+LEAST_KEPT = 1 << 16  # steps of an unfinished revolution that are held before any is dropped
 
 
 @dataclass(frozen=True)

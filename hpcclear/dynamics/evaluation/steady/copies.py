@@ -13,8 +13,7 @@ from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.planar.tolerances import LENGTH, absolute_tolerances
 from hpcclear.scene import Scene
 
-PERTURBATION = 1e-5
-"""Size of the perturbations, relative to `scales`: 10 nm, 10 um/s."""
+PERTURBATION = 1e-5  # size of the perturbations, relative to `scales`: 10 nm, 10 um/s
 
 
 def scales(scene: Scene) -> Array:

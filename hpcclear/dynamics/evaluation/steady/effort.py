@@ -14,14 +14,9 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.dynamics.evaluation.steady.copies import perturbed
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 
-STRICTER = 10.0
-"""How many times tighter than the others' the tolerances of half of the copies are."""
-
-TIGHTEST = 1e-11
-"""Looser of two tolerances, at least."""
-
-SPEED = 2.0
-"""Relative movement of f, at most, over that of a free crank's mean speed."""
+STRICTER = 10.0  # how many times tighter than the others' the tolerances of half of the copies are
+TIGHTEST = 1e-11  # looser of two tolerances, at least
+SPEED = 2.0  # relative movement of f, at most, over that of a free crank's mean speed
 
 STEADY = 0.8
 """Change of the average over a doubling of the revolutions, over that of the doubling before, that shows no settling."""

@@ -18,26 +18,20 @@ LOOSEST = 1e-5
 """Looser of the two tolerances at first, at most: at 1e-3 the mean was off by up to 209 % on nine chaotic scenes, at 1e-4 by
 0.06 to 1.7 % on three of five, and a revolution at 1e-5 costs 5 to 25 % more than at 1e-4."""
 
-LOOSEST_LATCHED = 1e-6
-"""Likewise with a damping that keeps the impact speed."""
+LOOSEST_LATCHED = 1e-6  # likewise with a damping that keeps the impact speed
 
 LEVEL = 0.96
 """Of the intervals that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
 
-SHIFT = 2e-3
-"""What the looser of these tolerances moves a mean by as a rule, relative."""
+SHIFT = 2e-3  # what the looser of these tolerances moves a mean by as a rule, relative
 
-POOLED = 2.0
-"""Standard errors (and `SHIFT`) up to which the rest of a difference between the tolerances is chance."""
-
-LEFT = 0.3
-"""Assumed residual bias of the tighter tolerance, as a fraction of an insignificant difference."""
+POOLED = 2.0  # standard errors (and `SHIFT`) up to which the rest of a difference between the tolerances is chance
+LEFT = 0.3  # assumed residual bias of the tighter tolerance, as a fraction of an insignificant difference
 
 DOUBTED = 3.5
 """Standard errors above which the looser tolerance is rejected; at 2.5 chance rejects more of them, at twice the cost."""
 
-COPIES = 32
-"""Copies of an ensemble at first, every other one at the stricter tolerance."""
+COPIES = 32  # copies of an ensemble at first, every other one at the stricter tolerance
 
 SEGMENT = 4
 """Revolutions between two looks at an ensemble, and those that its peaks are reported for."""
@@ -45,8 +39,7 @@ SEGMENT = 4
 PARTED = 12
 """Revolutions before the first look at an ensemble, from when the perturbations have grown to the size of the motion."""
 
-FIRST = 4, 6
-"""Segments before it, at least and at most."""
+FIRST = 4, 6  # segments before it, at least and at most
 
 MEMORY, LONG_MEMORY = 3.0, 10.0
 """Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what
@@ -60,11 +53,8 @@ LASTING = 40
 APPROACH = 0.85
 """Revolutions until the next look over those that seem to be needed: intervals scatter, and what is too much is not undone."""
 
-LEAST = 0.05
-"""Revolutions until the next look over those so far, at least: each look is another chance to stop too early."""
-
-RESTLESS = 4
-"""Doublings in a row over which the average moved no less than before, after which there is no steady mean."""
+LEAST = 0.05  # revolutions until the next look over those so far, at least: each look is another chance to stop too early
+RESTLESS = 4  # doublings in a row over which the average moved no less than before, after which there is no steady mean
 
 
 @dataclass

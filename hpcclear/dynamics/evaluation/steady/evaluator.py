@@ -25,8 +25,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of
 
-TURN_SECONDS = 0.02
-"""How long one set of lanes works before the next one does."""
+TURN_SECONDS = 0.02  # how long one set of lanes works before the next one does
 
 
 Procedure = Callable[[Sample], Generator[Segment, Outcome, Mean]]

@@ -11,20 +11,12 @@ LEVEL = 0.97
 """Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
 one more chance to stop on intervals that are too narrow."""
 
-PARTS = 8
-"""Of a copy's segments, at most, whose scatter gives that of its mean: each as long as it can be."""
+PARTS = 8  # of a copy's segments, at most, whose scatter gives that of its mean: each as long as it can be
+APART = 1.5  # variance between means of copies over that which their parts explain, from which on it alone counts
 
-APART = 1.5
-"""Variance between means of copies over that which their parts explain, from which on it alone counts."""
-
-NEARLY = 1.1
-"""Square of a standard error over the least, that is as good."""
-
-SLOWEST = 0.97
-"""Ratio of a geometric approach beyond which nobody knows where it ends."""
-
-DRIFT = 3.5
-"""Standard errors of a drift, or of a difference between tolerances, that is no chance."""
+NEARLY = 1.1  # square of a standard error over the least, that is as good
+SLOWEST = 0.97  # ratio of a geometric approach beyond which nobody knows where it ends
+DRIFT = 3.5  # standard errors of a drift, or of a difference between tolerances, that is no chance
 
 
 def objective(gaps: Array) -> Array:

@@ -19,8 +19,7 @@ SHARE = 0.1
 """First guess of rtol over the target error: on 200 random scenes of the paper's box (Hunt-Crossley, 0.5 s/m) the error of
 f was below 10 rtol in 95 % for rtol from 5e-4 to 3e-5, and below 6 rtol at 1e-5."""
 
-LOOSEST = 1e-3
-"""Tolerance that a look starts with at most."""
+LOOSEST = 1e-3  # tolerance that a look starts with at most
 
 SHARE_LATCHED = 1e-3
 """`SHARE` with such a damping: a tolerance moves a motion to another orbit, and at a looser one the four copies of a look can
@@ -29,16 +28,14 @@ agree on orbits that are off by 0.04 to 0.6 %."""
 CHECKPOINTS = (4, 6, 8, 12, 16, 24, 32, 48, 64)
 """Revolutions after which a look is judged; from then on at each doubling."""
 
-PATIENCE = 16
-"""Revolutions that copies have for coming together."""
+PATIENCE = 16  # revolutions that copies have for coming together
 
 SWINGS = 2.0
 """What an average may still be off by, over the larger of its two latest movements: an approach that swings, or slows down
 as a slower one takes over, comes to a rest for a quarter and goes on. Intervals from the last movement alone missed by
 up to nine times their width."""
 
-TOLERANCES = 10.0
-"""Likewise, over the tolerance of the stricter copies, where these and the looser ones agree by chance."""
+TOLERANCES = 10.0  # likewise, over the tolerance of the stricter copies, where these and the looser ones agree by chance
 
 ORBITS, COARSE = 6e-3, 3e-3
 """Likewise, relative, with a damping that keeps the impact speed, where the target is no stricter than the second: at the

@@ -13,15 +13,13 @@ from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.planar.tolerances import LENGTH
 
-RTOL = 1e-8
-"""Tolerance of a map. The exponent of the paper's scene is -0.32 at 1e-11; this finds -0.31."""
+RTOL = 1e-8  # tolerance of a map. The exponent of the paper's scene is -0.32 at 1e-11; this finds -0.31.
 
 DISTANCE = 1e-4
 """Of a shadow from its copy, over scale. Less, and the steps of the two, which are not the same, part them by more than the
 motion does (at 1e-6 it finds 2.2 where -0.32 is right); more, and it is not small beside a penetration."""
 
-OWN, OTHER = 4, 4
-"""Copies of the scene's own start, each with a shadow; and other starts."""
+OWN, OTHER = 4, 4  # copies of the scene's own start, each with a shadow; and other starts
 
 FAR = 0.2
 """Perturbation of the other starts over the smallest clearance (velocities: over as many m/s as mm); journals stay inside."""
@@ -34,11 +32,9 @@ SURE = 0.1
 """Limit of an exponent that is narrow enough, over the exponent or a revolution, whichever is more: half of it takes four times
 the revolutions of a chaotic cell."""
 
-SAME = 1e-4
-"""Relative difference of f between two starts that end in the same motion."""
+SAME = 1e-4  # relative difference of f between two starts that end in the same motion
 
-REPEATS = 1e-5
-"""Relative difference of f between two revolutions of a periodic motion that are a period apart."""
+REPEATS = 1e-5  # relative difference of f between two revolutions of a periodic motion that are a period apart
 
 
 def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Mean]:

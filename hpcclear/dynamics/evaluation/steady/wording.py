@@ -9,8 +9,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.scene import Scene
 
-NAMED = 8
-"""Samples that are named at most."""
+NAMED = 8  # samples that are named at most
 
 
 def missed(records: Records) -> Booleans:
