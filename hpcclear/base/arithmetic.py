@@ -120,7 +120,8 @@ class _Reader:
                 reason = f"has the condition {_shown(node)} where a number is expected"
                 raise FormulaError(reason, "Write (a if condition else b)")
         allowed = "arithmetic" if self.words else "numbers, variables and + - * / **"
-        raise FormulaError(f"has more than {allowed}: {_shown(node)}", f'Write "{self.example}"')
+        remedy = f'Write, say, "{self.example}"'
+        raise FormulaError(f"contains more than {allowed}: {_shown(node)}", remedy)
 
     def condition(self, node: ast.expr) -> ast.expr:
         match node:

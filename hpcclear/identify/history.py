@@ -32,7 +32,7 @@ def seconds_of(dates: tuple[str, ...], count: int) -> Array:
     try:
         days = np.array([float(date.fromisoformat(one).toordinal()) for one in dates])
     except ValueError:
-        raise InputError("--date", ", ".join(dates), "is no date", "Write 2026-11-27") from None
+        raise InputError("--date", ", ".join(dates), "is no date", "Write YYYY-MM-DD") from None
     if (np.diff(days) <= 0.0).any():
         listed = ", ".join(dates)
         raise InputError("--date", listed, "dates do not rise", "Sort the signals by date")

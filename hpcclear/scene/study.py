@@ -207,7 +207,7 @@ class Study(StudyTables):
             parameter = self.sensitivity.parameter
             if parameter is None:
                 reason = "not one variable drives clearances, so the fixed parameter is not known"
-                raise invalid(reason, f"Use {', '.join(self.names)}", "sensitivity.parameter")
+                raise invalid(reason, f"Name one: {', '.join(self.names)}", "sensitivity.parameter")
             check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):
                 reason = "the parameter is fixed, so it cannot be an input of a surface"
