@@ -80,15 +80,12 @@ class _Writer:
         self.returns: list[tuple[str | None, str]] = []
         self.count = 0
         self.statements(tree.body, None)
-        if not self.returns or self.returns[-1][0] is not None:
-            if not self.returns:
-                raise LawError(f"{self.title} returns nothing", "End it with return")
-            guard, value = self.returns[-1]
-            if not self.exhaustive(tree.body):
-                raise LawError(f"{self.title} does not always return", "End it with return")
-            self.returns[-1] = (None, value)
-        result = self.returns[-1][1]
-        for guard, value in reversed(self.returns[:-1]):
+        if not self.returns:
+            raise LawError(f"{self.title} returns nothing", "End it with return")
+        *others, (last, result) = self.returns
+        if last is not None and not self.exhaustive(tree.body):
+            raise LawError(f"{self.title} does not always return", "End it with return")
+        for guard, value in reversed(others):
             result = f"({value} if {guard} else {result})"
         body = "\n".join(f"    {line}" for line in [*self.lines, f"return {result}"])
         text = f"@lane_function\ndef {name}({', '.join(map(self.local, arguments))}):\n{body}\n"
@@ -128,21 +125,15 @@ class _Writer:
                     sum_ = ast.BinOp(ast.Name(target.id, ast.Load()), op, value)
                     self.assign(name, self.text(sum_), guard)
                 case ast.If(test=test, body=yes, orelse=no):
-                    self.branches(test, yes, no, guard, body[k + 1 :])
+                    here = self.let(f"1.0 if {self.text(test)} else 0.0")
+                    before = "" if guard is None else f"({guard}) & "
+                    self.statements(yes, f"{before}({here} == 1.0)")
+                    self.statements(no, f"{before}({here} == 0.0)")
+                    self.statements(body[k + 1 :], guard)
                     return
                 case _:
-                    raise LawError(
-                        f"{self.title} contains more than arithmetic: {ast.unparse(one)!r}"
-                    )
-
-    def branches(
-        self, test: ast.expr, yes: list[ast.stmt], no: list[ast.stmt], guard: str | None, rest: list[ast.stmt]
-    ) -> None:  # fmt: skip
-        here = self.let(f"1.0 if {self.text(test)} else 0.0")
-        before = "" if guard is None else f"({guard}) & "
-        self.statements(yes, f"{before}({here} == 1.0)")
-        self.statements(no, f"{before}({here} == 0.0)")
-        self.statements(rest, guard)
+                    said = f"{self.title} contains more than arithmetic: {ast.unparse(one)!r}"
+                    raise LawError(said)
 
     def assign(self, name: str, value: str, guard: str | None) -> None:
         own = self.local(name)
@@ -169,9 +160,7 @@ class _Writer:
                 return self.text(operand)
             case ast.BinOp(left=base, op=ast.Pow(), right=power):
                 return self.power(base, power)
-            case ast.BinOp(
-                left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right
-            ):
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _SIGNS:
                 return f"({self.text(left)} {_SIGNS[type(op)]} {self.text(right)})"
             case ast.IfExp(test=test, body=yes, orelse=no):
                 return f"({self.text(yes)} if {self.text(test)} else {self.text(no)})"
@@ -251,9 +240,8 @@ class _Writer:
         texts = [self.text(one) for one in arguments]
         name = getattr(function, "__name__", "")
         home = str(getattr(function, "__module__", "") or "")
-        known = home.partition(".")[0] in ("builtins", "math", "numpy") or isinstance(
-            function, np.ufunc
-        )
+        own = home.partition(".")[0] in ("builtins", "math", "numpy")
+        known = own or isinstance(function, np.ufunc)
         if name == "float" and known:
             return texts[0]
         if known and name in WORDS:

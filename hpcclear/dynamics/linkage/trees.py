@@ -99,11 +99,8 @@ def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
     closures: list[Joint] = []
     order = {"fixed": 0, "slide": 1, "revolute": 2}
     for joint in sorted(m.ideal, key=lambda joint: order.get(joint.kind, len(order))):
-        if joint.holds == 1:  # nothing hangs by one constraint alone
-            closures.append(joint)
-            continue
         one, two = (group[split(place)[0]] for place in places_of(joint))
-        if one == two:
+        if one == two or joint.holds == 1:  # nothing hangs by one constraint alone
             closures.append(joint)
             continue
         edges.append(joint)
