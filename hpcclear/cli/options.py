@@ -14,7 +14,7 @@ from click.decorators import FC
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
 from hpcclear.ranks.launcher import launched_rank
-from hpcclear.ranks.stopping import Exit, StopSwitch
+from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.ranks.terminal import clear, write
 
 if TYPE_CHECKING:
@@ -186,13 +186,17 @@ DETAILS = option(
 )  # fmt: skip
 
 
-def command(group: str, words: str, ranks: bool = False) -> Callable[[Callable[..., int]], Command]:
+Run = Callable[..., int | None]
+"""What a command does: it returns an exit code, none where all is done."""
+
+
+def command(group: str, words: str, ranks: bool = False) -> Callable[[Run], Command]:
     """Make a command of a function; its name is that of the function's file.
 
     `words`: its line in the list of commands. Other arguments: see `Command`.
     """
 
-    def declared(function: Callable[..., int]) -> Command:
+    def declared(function: Run) -> Command:
         name = function.__module__.rpartition(".")[2]
         work = function if ranks else _of_root(function)
         work = DETAILS(work) if group == "compute" else work
@@ -203,12 +207,12 @@ def command(group: str, words: str, ranks: bool = False) -> Callable[[Callable[.
     return declared
 
 
-def _of_root(function: Callable[..., int]) -> Callable[..., int]:
+def _of_root(function: Run) -> Run:
     """A command that one process carries out."""
 
     @functools.wraps(function)
-    def alone(**values: object) -> int:
-        return function(**values) if is_root() else Exit.DONE
+    def alone(**values: object) -> int | None:
+        return function(**values) if is_root() else None
 
     return alone
 
@@ -230,12 +234,12 @@ def check_mode(
             raise click.UsageError(f"{why}.", context)
 
 
-def with_scene(function: Callable[..., int]) -> Callable[..., int]:
+def with_scene(function: Run) -> Run:
     """Give a command a scene file and its overrides, as its argument `written`."""
     return FILE(SET(function))
 
 
-def with_how(function: Callable[..., int]) -> Callable[..., int]:
+def with_how(function: Run) -> Run:
     """Give a command the options of `How`, as its argument `how`."""
     return FRESH(LIMIT(INTERVAL(PROGRESS(function))))
 

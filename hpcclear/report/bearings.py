@@ -155,10 +155,7 @@ def share(contact: float) -> str:
     """Return a share of the time in words; a share that is not 0 or 1 is never rounded to it."""
     if not np.isfinite(contact):
         return "–"
-    if contact in (0.0, 1.0):
-        return f"{100 * contact:.0f} %"
-    shown = f"{100 * contact:.1f} %"
-    return "> 99.9 %" if contact > 0.999 else "< 0.1 %" if contact < 0.001 else shown
+    return f"{100 * contact:.0f} %" if contact in (0.0, 1.0) else motion.part(contact)
 
 
 def pressures(found: Sequence[Bearing]) -> list[tuple[str, Callable[[Bearing], str]]]:

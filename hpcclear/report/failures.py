@@ -30,12 +30,6 @@ class SampledVariable(NamedTuple):
     values: Array
 
 
-def explained(samples: Results) -> list[str]:
-    """Return a sentence for each status of failed samples (kind ``samples``): how many, why, in which ranges of which
-    variables, what to do."""
-    return list(sentences(samples["status"].values, variables(samples)))
-
-
 def variables(samples: Results) -> list[SampledVariable]:
     """Return the design variables of samples (kind ``samples``)."""
     return [
@@ -44,10 +38,16 @@ def variables(samples: Results) -> list[SampledVariable]:
     ]
 
 
+def explained(samples: Results) -> list[str]:
+    """Return `sentences` of samples (kind ``samples``)."""
+    return list(sentences(samples["status"].values, variables(samples)))
+
+
 def sentences(
     status: Array, columns: Sequence[SampledVariable], what: str = "samples"
 ) -> Iterator[str]:
-    """Return the same of outcomes (n,) and the variables of what was simulated."""
+    """Yield a sentence for each status of failures, of outcomes (n,) and the variables of what was simulated: how many, why, in
+    which ranges of which variables, what to do."""
     for code in Status:
         failed = status == code
         if code is Status.OK or not failed.any():

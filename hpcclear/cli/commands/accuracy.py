@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
@@ -35,7 +34,7 @@ def run(
     plan: bool,
     error: float | None,
     workers: int | None,
-) -> int:
+) -> None:
     """Plot accuracy against run time, for each setting that costs time: tolerance, revolutions, points of the surrogate,
     Monte Carlo samples and number of ranks.
 
@@ -54,7 +53,6 @@ def run(
         raise click.UsageError("Missing option '-o' / '--output'.", click.get_current_context())
     else:
         _measure(written, output, quick, fresh, time_limit)
-    return Exit.DONE
 
 
 def _measure(

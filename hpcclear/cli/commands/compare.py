@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from hpcclear.report.compare import ComparedSignal
@@ -30,7 +29,9 @@ MOST = 16
     words="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
 )  # fmt: skip
 @cli.DETAILS
-def run(file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]) -> int:
+def run(
+    file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]
+) -> None:
     """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
 
     The first column is time or crank_angle, the others are quantities as exported tables name them, such as
@@ -72,7 +73,6 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
         from hpcclear.report import overlay_figure, save
 
         cli.show(f"figure   {save(overlay_figure(found), cli.place_of(output))}")
-    return Exit.DONE
 
 
 def _norms(one: "ComparedSignal") -> list[tuple[str, str]]:

@@ -6,7 +6,6 @@ import click
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("compute", "Find effects that can be neglected.", ranks=True)
@@ -35,7 +34,7 @@ def run(
     forces: bool,
     reduced: Path | None,
     how: cli.How,
-) -> int:
+) -> None:
     """Find effects that can be neglected: clearance in each joint, friction, gravity, loads and others.
 
     Each effect is disabled in turn. The command measures how results and run time change, with confidence intervals.
@@ -61,7 +60,6 @@ def run(
             from hpcclear.results import files
 
             files.write_bytes(cli.place_of(reduced), found.content.attrs["reduced_scene"].encode())
-    return Exit.DONE
 
 
 def tolerance_of(words: str) -> float:

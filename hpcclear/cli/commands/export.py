@@ -6,7 +6,6 @@ import click
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("keep", "Write results as a table for Excel, MATLAB or pandas.")
@@ -28,7 +27,7 @@ def run(
     units: tuple[str, ...],
     statistics: bool,
     beyond: tuple[str, ...],
-) -> int:
+) -> None:
     """Write a result file as a table: one row per design or instant, joints as columns.
 
     Headings are names with units. Quantities have the units that the scene file uses, otherwise SI units.
@@ -60,4 +59,3 @@ def run(
             named = f"{', '.join(left[:3])}{more}"
             cli.say(f"Note: left out, with too many columns for a table: {named} (in {files[0]})")
     cli.show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
-    return Exit.DONE

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("start", "Write a starter scene, or a linkage from points or a drawing.")
@@ -40,7 +39,7 @@ def run(
     imports: bool,
     unit: str,
     sketch: Path | None,
-) -> int:
+) -> None:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
     With --jobs, write the scenes and scripts that the documentation names, as a directory.
@@ -71,7 +70,6 @@ def run(
     else:
         name = "four_stroke" if four_stroke else "compressor" if compressor else "starter"
         _write_starter(file, name)
-    return Exit.DONE
 
 
 def _write_starter(file: Path, name: str) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
@@ -42,7 +41,7 @@ def run(
     transient: int,
     revolutions: int,
     how: cli.How,
-) -> int:
+) -> None:
     """Map periodic and chaotic motion over one or two entries of the scene.
 
     Each cell has the largest Lyapunov exponent per revolution, the period, the number of different
@@ -72,4 +71,3 @@ def run(
         else:
             axes = (x,) if y is None else (x, y)
             describe_run(run_map(scene, axes, place, ranks, how.options()), "map")
-    return Exit.DONE

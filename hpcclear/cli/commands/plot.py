@@ -8,7 +8,6 @@ import click
 
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +63,7 @@ def run(
     revolutions: int,
     trust: bool,
     **look: Any,
-) -> int:
+) -> None:
     """Draw figures of result files or of a directory of results, and films of the motion. Figures of responses show several
     designs: those of a directory, or of several files.
 
@@ -88,11 +87,10 @@ def run(
         if output is None:
             if animation is None:
                 cli.show(f"figures of {', '.join(map(str, places))}: {', '.join(every)}")
-            return Exit.DONE
+            return
         with printing(texts=dict(map(_label, texts)), **look):
             drawn = _drawn(chosen, bool(names))
         _save(drawn, output, kind)
-    return Exit.DONE
 
 
 def _film(content: "Content", place: Path, seconds: float, revolutions: int) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("look", "Write figures and an HTML page.")
@@ -13,7 +12,7 @@ from hpcclear.ranks.stopping import Exit
 @cli.option("-o --output", "Page to write. Default: report.html beside the results.", type=cli.PATH)
 @cli.flag("--sheet", "Write one sheet of A4 to sign (sheet.pdf) instead of the page.")
 @cli.TRUST
-def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool) -> int:
+def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool) -> None:
     """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
     Examples: hpcclear report results/quickstart, hpcclear report results/quickstart --sheet
@@ -26,4 +25,3 @@ def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool)
     with trusting(trust):
         place = write(*places, output=output and cli.place_of(output))
     cli.show(f"{'sheet' if sheet else 'report'}  {place}")
-    return Exit.DONE

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("compute", "Run a complete study.", ranks=True)
@@ -15,7 +14,7 @@ from hpcclear.ranks.stopping import Exit
 @cli.PROGRESS
 def run(
     written: cli.Written, output: Path, fresh: bool, time_limit: float | None, progress: Any
-) -> int:
+) -> None:
     """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
     Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
@@ -30,4 +29,3 @@ def run(
         how = {"fresh": fresh, "progress_style": progress, "notify": cli.say}
         place = run_study(scene, cli.place_of(output), ranks, **how)
         describe(read(place), place / "verification.nc")
-    return Exit.DONE

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("compute", "Simulate many designs.", ranks=True)
@@ -40,7 +39,7 @@ def run(
     part: str | None,
     merge: bool,
     how: cli.How,
-) -> int:
+) -> None:
     """Simulate the designs of the study, or those of a table (--points).
 
     With --merge, give the same scene, --set, --points and -o as for the parts. The parts are kept; missing parts are listed.
@@ -50,7 +49,7 @@ def run(
     if merge:
         simulating = ("thresholds", "statistics", "raw", "part", *cli.How._fields)
         cli.check_mode("--merge", True, simulating)
-        return _merge(written, output, points) if cli.is_root() else Exit.DONE
+        return _merge(written, output, points) if cli.is_root() else None
     with cli.on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         scene = cli.read_scene(written)
@@ -71,17 +70,15 @@ def run(
             run = partial(run_sample, scene, place, ranks, options=how.options())
             found = run(table=points, part=chosen)
             describe_run(found, "samples", shares(found.content, levels))
-    return Exit.DONE
 
 
-def _merge(written: cli.Written, output: Path, points: Path | None) -> int:
+def _merge(written: cli.Written, output: Path, points: Path | None) -> None:
     scene = cli.read_scene(written)
     from hpcclear.cli.printing import describe_run
     from hpcclear.ensemble.samples import design, run_merge
     from hpcclear.ranks.boundary import alone
 
     describe_run(run_merge(scene, design(scene, points), output, alone()), "samples")
-    return Exit.DONE
 
 
 def _check_kind(

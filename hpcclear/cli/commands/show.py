@@ -6,13 +6,12 @@ import click
 
 from hpcclear import __version__
 from hpcclear.cli import options as cli
-from hpcclear.ranks.stopping import Exit
 
 
 @cli.command("start", "Show laws, the schema of scene files, or how to cite.")
 @click.argument("what", type=click.Choice(["laws", "schema", "citation"]))
 @cli.DETAILS
-def run(what: str) -> int:
+def run(what: str) -> None:
     """Show what this version knows.
 
     laws: laws, geometries of contact, objectives, distributions, surrogates and searches that a scene may name, those of
@@ -26,7 +25,6 @@ def run(what: str) -> int:
     Example: hpcclear show citation > hpcclear.bib
     """
     {"laws": _laws, "schema": _schema, "citation": _citation}[what]()
-    return Exit.DONE
 
 
 def _schema() -> None:

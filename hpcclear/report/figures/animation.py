@@ -136,9 +136,9 @@ class _Mechanism:
 def _forces(axes: "style.Axes", shown: Results) -> Any:
     """Contact forces over the revolutions, and the line that marks the instant."""
     unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
-    for row, (joint, label) in enumerate(motion.joints(shown).items()):
+    for row, joint in enumerate(motion.joints(shown)):
         force = unit(shown["contact_force"].sel(joint=joint))
-        axes.plot(turn, force, color=style.colour(row), lw=0.8, label=labels.literal(label))
+        axes.plot(turn, force, color=style.colour(row), lw=0.8, label=labels.literal(joint))
     style.key(axes, "above")
     axes.set(xlabel=motion.turns_label(shown), ylabel=unit.label("contact force"))
     return axes.axvline(turn[0], color=style.colour("ink"), lw=1.0, animated=True)

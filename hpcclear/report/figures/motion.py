@@ -73,9 +73,9 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
     return response.isel(time=np.flatnonzero(inside))
 
 
-def joints(response: Results) -> dict[str, str]:
-    """Names of the joints of a response, by label."""
-    return {label: label for label in texts_in(response, "joint")}
+def joints(response: Results) -> list[str]:
+    """Labels of the joints of a response."""
+    return texts_in(response, "joint")
 
 
 def pins(response: Results) -> list[str]:
@@ -93,8 +93,8 @@ def of_pins(response: Results) -> Results:
 
 def quantities(response: Results) -> list[tuple[str, str, str]]:
     """What responses are compared by: variable, joint or "", words."""
-    named = enumerate(joints(response).items(), 1)
-    found = [("contact_force", label, f"contact force {k} ({name})") for k, (label, name) in named]
+    named = enumerate(joints(response), 1)
+    found = [("contact_force", label, f"contact force {k} ({label})") for k, label in named]
     found.append(("crank_moment", "", "torque of the drive"))
     if "slider_acceleration" in response:
         found.append(("slider_acceleration", "", "slider acceleration"))
@@ -145,9 +145,12 @@ def contact(response: Results, joint: str) -> str:
         return f"in {'contact' if touching.all() else 'flight'} at all instants stored"
     time = response["time"].values
     weight = np.gradient(time) if len(time) > 1 else np.ones(1)
-    share = float(weight @ touching / weight.sum())
-    shown = "> 99.9" if share > 0.999 else "< 0.1" if share < 0.001 else f"{100.0 * share:.1f}"
-    return f"in contact {shown} % of the time"
+    return f"in contact {part(float(weight @ touching / weight.sum()))} of the time"
+
+
+def part(share: float) -> str:
+    """Return a share of the time that is neither 0 nor 1 in words, which say neither."""
+    return "> 99.9 %" if share > 0.999 else "< 0.1 %" if share < 0.001 else f"{100.0 * share:.1f} %"
 
 
 def eccentricity(response: Results) -> Array:

@@ -31,7 +31,7 @@ def orbit_figure(response: Results) -> "style.Figure":
         _circle(panel, clearances[row])
         arc = _along(np.full_like(angle, clearances[row]), angle, contact)
         panel.plot(*arc, color=style.colour("ink"), lw=2.4, label="contact arc")
-        panel.set_title(f"{joints[joint]}\n{motion.contact(shown, joint)}")
+        panel.set_title(f"{joint}\n{motion.contact(shown, joint)}")
         _equal(panel, unit)
     style.legend(figure, axes[0, 0], "lower")
     return figure
@@ -54,7 +54,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
         colour = np.mod(turn, 1.0)[contact] * 360.0
         look: style.Look = {"s": 3.0, "cmap": _cyclic(), "vmin": 0.0, "vmax": 360.0, "lw": 0}
         drawn = panel.scatter(np.arctan2(y, x)[contact], radius[contact], c=colour, **look)
-        panel.set_title(joints[joint])
+        panel.set_title(joint)
         panel.set_rlabel_position(112.5)
         panel.set_ylabel(force.label("contact force"), labelpad=22.0)
         panel.set_xlabel("direction of the force on the bearing (°)")
@@ -104,7 +104,7 @@ def poincare_figure(response: Results, revolutions: int | None = None) -> "style
     the response has, the more it says.
     """
     shown = motion.steady(response, revolutions)
-    joints = list(motion.joints(shown).values())
+    joints = motion.joints(shown)
     cells = [["motion"] * max(len(joints), 1), joints or ["."]]
     figure, axes = style.mosaic(cells, 118.0, height_ratios=[1.1, 1.0])
     top, panels = axes["motion"], [axes[joint] for joint in joints]

@@ -22,10 +22,10 @@ def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure
         word = "torque of the drive" if name == "crank_moment" else name.replace("_", " ")
         unit = labels.of(shown[name])
         if "joint" in shown[name].dims:
-            for row, (joint, label) in enumerate(motion.joints(shown).items()):
+            for row, joint in enumerate(motion.joints(shown)):
                 force, width = unit(shown[name].sel(joint=joint)), max(0.8 - 0.2 * row, 0.4)
                 look: style.Look = {"color": style.colour(row), "lw": width}  # later ones on top
-                panel.plot(motion.turns(shown), force, label=label, **look)
+                panel.plot(motion.turns(shown), force, label=joint, **look)
             style.key(panel, "above", borderaxespad=0.1)
         else:
             panel.plot(motion.turns(shown), unit(shown[name]), color=style.colour("blue"))
@@ -47,7 +47,7 @@ def penetration_figure(response: Results) -> "style.Figure":
         depth = unit(shown["penetration"].sel(joint=joint))
         panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
-        panel.set_title(f"{joints[joint]}\n{motion.contact(shown, joint)}")
+        panel.set_title(f"{joint}\n{motion.contact(shown, joint)}")
         panel.set_ylabel(unit.label("penetration"))
     axes[0, 0].set_ylim(bottom=0.0)  # at last, as a limit ends the automatic scale that they share
     axes[-1, 0].set_xlabel(motion.turns_label(shown))

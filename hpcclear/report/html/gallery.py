@@ -135,7 +135,7 @@ def _clearances(*responses: Results) -> str:
     parts: list[str] = []
     if any("penetration" not in one for one in responses):  # of ideal joints
         return ""
-    for joint, name in enumerate(motion.joints(responses[0]).values()):
+    for joint, name in enumerate(motion.joints(responses[0])):
         known = [motion.clearances(one)[joint] for one in responses]
         shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}
         if len(shown) == 1:

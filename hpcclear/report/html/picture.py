@@ -165,7 +165,7 @@ def frames(response: Results, before: Results) -> dict[str, Any]:
         "angles": _digits(angles),
         "still": [bool(one) for one in still],
         "pairs": moving.pairs(points, e),
-        "joints": list(motion.joints(held).values()),
+        "joints": motion.joints(held),
         "clearance": np.nan_to_num(motion.clearances(held)).tolist(),
         "turn": _digits(motion.turns(shown)),
         "e": _digits(e.reshape(len(e), -1)),
