@@ -1,7 +1,8 @@
 """What modules of the report declare of the results that they show: figures, sections of the page, lines of the answer.
 
-Each stands beside its code, in a tuple `PARTS` of its module, and `declared` finds it there. What a file of a kind holds is
-declared in `hpcclear.results.kinds`.
+Each stands beside its code, in a tuple `PARTS` of its module or, of a figure, above its function
+(`hpcclear.report.figures.style.figure`), and `declared` finds it there. What a file of a kind holds is declared in
+`hpcclear.results.kinds`.
 """
 
 import pkgutil
@@ -112,8 +113,12 @@ Part = TypeVar("Part", FigureOf, SectionOf, LinesOf)
 
 @cache
 def _all() -> tuple[object, ...]:
-    modules = pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}.")
-    return tuple(part for one in modules for part in getattr(import_module(one.name), "PARTS", ()))
+    names = (
+        one.name for one in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}.")
+    )
+    modules = [vars(import_module(name)) for name in names]
+    figures = (getattr(one, "declared", None) for own in modules for one in own.values())
+    return (*(part for own in modules for part in own.get("PARTS", ())), *figures)
 
 
 def declared(sort: type[Part]) -> list[Part]:

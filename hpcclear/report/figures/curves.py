@@ -8,7 +8,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -85,7 +84,7 @@ def outline(curve: Tabulated) -> str:
     return " ".join(f"{100 * x:.1f},{24 - 24 * y:.1f}" for x, y in shares.T)
 
 
-@style.drawn
+@style.figure("response", "tables", "tables of the scene, as they are simulated", 100)
 def tables_figure(response: Results) -> "style.Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
     tables = tabulated(scene_of_text(str(response.attrs["scene"]), "scene"))
@@ -141,8 +140,3 @@ def _drawn(curve: Pieces) -> tuple[Array, Array]:
     last = np.nextafter(1.0, 0.0)
     places = np.append(share, last) * curve.length
     return places, curve.at(places)
-
-
-PARTS = (
-    FigureOf("response", "tables", tables_figure, "tables of the scene, as they are simulated", 100),
-)  # fmt: skip

@@ -9,11 +9,13 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, each, text_in, texts_in
 
 
-@style.drawn
+@style.figure(
+    "front", "front",
+    "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs.", beside="verification",
+)  # fmt: skip
 def front_figure(front: Results, verification: Results | None = None) -> "style.Figure":
     """Pareto fronts of all cases (kind ``front``), and the designs that were simulated (the paper's Fig. 9; kind
     ``verification``), with confidence intervals, joined to what the surrogate said.
@@ -199,12 +201,3 @@ def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
     style.legend(figure, axes[0], "lower", columnspacing=1.0)
     figure.align_ylabels(axes[:, 0])
     return figure
-
-
-PARTS = (
-    FigureOf(
-        "front", "front", front_figure,
-        "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs.",
-        beside="verification",
-    ),
-)  # fmt: skip

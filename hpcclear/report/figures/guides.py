@@ -7,7 +7,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
 
@@ -37,7 +36,7 @@ def touches(response: Results) -> list[Touch]:
     return sorted(found)
 
 
-@style.drawn
+@style.figure("response", "guide", "offset, tilt and contacts in guides", 40, along="guide")
 def guide_figure(response: Results) -> "style.Figure":
     """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last two revolutions of a
     response (kind ``response``). Raises InputError where no guide has clearance."""
@@ -73,8 +72,3 @@ def _corners(panel: "style.Axes", shown: Results, turn: Array) -> None:
     panel.set_yticks(range(len(rows)), [label.replace("_", " ") for label in rows])
     panel.set_ylim(len(rows) - 0.5, -0.5)
     panel.set_title("corners in contact")
-
-
-PARTS = (
-    FigureOf("response", "guide", guide_figure, "offset, tilt and contacts in guides", 40, along="guide"),
-)  # fmt: skip

@@ -4,7 +4,6 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
 BINS = 60
@@ -23,7 +22,10 @@ def _entry(identify: Results, unknown: int, scale: labels.Scale) -> str:
     return scale.label(labels.entry(texts_in(identify, "unknown")[unknown]))
 
 
-@style.drawn
+@style.figure(
+    "identify", "posterior",
+    "Posterior of each unknown with its calibrated 95 % interval.",
+)  # fmt: skip
 def posterior_figure(identify: Results) -> "style.Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``. Raises
     InputError where no signal was measured."""
@@ -47,7 +49,10 @@ def posterior_figure(identify: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "identify", "features",
+    "Measured less predicted features of the last record, in standard deviations of the prediction.", 1,
+)  # fmt: skip
 def features_figure(identify: Results) -> "style.Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
     Raises InputError where no signal was measured."""
@@ -68,7 +73,10 @@ def features_figure(identify: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "identify", "growth",
+    "Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2,
+)  # fmt: skip
 def growth_figure(identify: Results) -> "style.Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
     Raises InputError where there is one record only, or none has a date."""
@@ -99,18 +107,3 @@ def growth_figure(identify: Results) -> "style.Figure":
         panel.set(xlabel="time since the first record (days)", ylabel=_entry(identify, u, scale))
         style.key(panel)
     return figure
-
-
-PARTS = (
-    FigureOf(
-        "identify", "posterior", posterior_figure, "Posterior of each unknown with its calibrated 95 % interval."
-    ),
-    FigureOf(
-        "identify", "features", features_figure,
-        "Measured less predicted features of the last record, in standard deviations of the prediction.", 1,
-    ),
-    FigureOf(
-        "identify", "growth", growth_figure,
-        "Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2,
-    ),
-)  # fmt: skip

@@ -8,7 +8,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.grids import cells_of
 
@@ -19,7 +18,10 @@ _PERIOD = "period, blank where none was found (revolutions)"
 _EXPONENT = "largest Lyapunov exponent (1/revolution)"
 
 
-@style.drawn
+@style.figure(
+    "map", "map",
+    "Largest Lyapunov exponent, period and regime of each cell of the map; along a line also f with its 95 % CI.",
+)  # fmt: skip
 def map_figure(samples: Results) -> "style.Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval. Raises InputError
     where the dataset is no map."""
@@ -102,7 +104,10 @@ def _line(cells: Results, name: str) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "bifurcation", "bifurcation",
+    "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions.",
+)  # fmt: skip
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
     """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``). A motion that repeats
     every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError where the dataset is no
@@ -122,15 +127,3 @@ def bifurcation_figure(bifurcation: Results) -> "style.Figure":
     words = unit.label(str(bifurcation["observed"].attrs["long_name"]))
     panel.set(xlabel=across, ylabel=words)
     return figure
-
-
-PARTS = (
-    FigureOf(
-        "map", "map", map_figure,
-        "Largest Lyapunov exponent, period and regime of each cell of the map; along a line also f with its 95 % CI.",
-    ),
-    FigureOf(
-        "bifurcation", "bifurcation", bifurcation_figure,
-        "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions.",
-    ),
-)  # fmt: skip

@@ -5,14 +5,13 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.noise import band_name
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable, texts_in
 
 FALL = 80.0
 """Levels that are further below the highest are not shown, dB."""
 
 
-@style.drawn
+@style.figure("response", "noise", "force levels and orders", 80, along="band")
 def noise_figure(response: Results) -> "style.Figure":
     """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
     squares of their orders. Raises InputError where the response has no levels."""
@@ -61,6 +60,3 @@ def _forces(response: Results) -> dict[str, tuple[Variable, Variable, Variable, 
         if float(np.max(own[-1])) > 0.0:
             found[joint.replace("_", " ")] = own
     return found  # type: ignore[return-value]
-
-
-PARTS = (FigureOf("response", "noise", noise_figure, "force levels and orders", 80, along="band"),)

@@ -7,11 +7,10 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
 
-@style.drawn
+@style.figure("response", "orbit", "journal-centre orbits in the clearance circle", 10)
 def orbit_figure(response: Results) -> "style.Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight, over the later half of the
     revolutions of a response (kind ``response``)."""
@@ -37,7 +36,7 @@ def orbit_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure("response", "force-direction", "contact force by its direction", 20)
 def force_polar_figure(response: Results) -> "style.Figure":
     """Contact force over its direction in the fixed frame, over the same revolutions as `orbit_figure`."""
     shown = motion.steady(response)
@@ -62,7 +61,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure("response", "phase", "phase portraits", 50)
 def phase_figure(response: Results) -> "style.Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
@@ -207,7 +206,7 @@ CROSSINGS = 200
 """Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
 
 
-@style.drawn
+@style.figure("response", "poincare", "Poincaré section, once a revolution", 60)
 def section_figure(response: Results) -> "style.Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
     count = motion.whole_turns(response) - int(response.attrs.get("transient_turns", 0))
@@ -216,11 +215,3 @@ def section_figure(response: Results) -> "style.Figure":
         remedy = f"Simulate with --set numerics.averaged_revolutions={CROSSINGS}"
         raise InputError("revolutions", count, reason, remedy)
     return poincare_figure(response, revolutions=count)
-
-
-PARTS = (
-    FigureOf("response", "orbit", orbit_figure, "journal-centre orbits in the clearance circle", 10),
-    FigureOf("response", "force-direction", force_polar_figure, "contact force by its direction", 20),
-    FigureOf("response", "phase", phase_figure, "phase portraits", 50),
-    FigureOf("response", "poincare", section_figure, "Poincaré section, once a revolution", 60),
-)  # fmt: skip

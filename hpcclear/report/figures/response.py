@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import cast
 
 from hpcclear.report.figures import designs, labels, motion, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
 
@@ -35,7 +34,7 @@ def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure
     return figure
 
 
-@style.drawn
+@style.figure("response", "penetration", "penetration", 30)
 def penetration_figure(response: Results) -> "style.Figure":
     """Penetration of the joints over the last two revolutions of a response (kind ``response``)."""
     shown = motion.latest(response)
@@ -54,7 +53,7 @@ def penetration_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure("response", "energy", "energy balance", 90)
 def energy_figure(response: Results) -> "style.Figure":
     """Energy balance of a response (kind ``response``): work of drive and loads and dissipated energy since the start, stored
     energy, and the residual."""
@@ -83,9 +82,3 @@ def energy_figure(response: Results) -> "style.Figure":
     axes[2, 0].set_ylabel(unit.label("|residual|"))
     axes[2, 0].set_xlabel(motion.turns_label(response))
     return figure
-
-
-PARTS = (
-    FigureOf("response", "penetration", penetration_figure, "penetration", 30),
-    FigureOf("response", "energy", energy_figure, "energy balance", 90),
-)

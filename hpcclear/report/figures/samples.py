@@ -7,11 +7,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable
 
 
-@style.drawn
+@style.figure(
+    "samples", "samples",
+    "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
+)  # fmt: skip
 def samples_figure(samples: Results) -> "style.Figure":
     """Objective of samples (kind ``samples``) against every design variable, coloured by clearance; its spread, histogram and
     failures. Raises InputError where there is no design variable to draw against."""
@@ -118,11 +120,3 @@ def _title(samples: Results) -> str:
     failed = int(np.count_nonzero(samples["status"]))
     latched = int(samples["latched"].values.any(axis=1).sum()) if "latched" in samples else 0
     return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"
-
-
-PARTS = (
-    FigureOf(
-        "samples", "samples", samples_figure,
-        "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
-    ),
-)  # fmt: skip

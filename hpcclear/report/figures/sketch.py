@@ -10,7 +10,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.written import reading
 from hpcclear.report.figures import curves, drawing, labels, motion, moving, style
 from hpcclear.report.figures.placed import Pose
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -79,7 +78,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
 _PICTURE = 95.0  # mm of width of a drawing alone
 
 
-@style.drawn
+@style.figure("response", "mechanism", "the mechanism to scale, with its dimensions", 5)
 def mechanism_figure(response: Results, before: Results | None = None) -> "style.Figure":
     """The mechanism of a response (kind ``response``) to scale, with dimensions; beside that of another design, parts that
     differ are coloured and its outline is dashed. Raises InputError where the file does not hold its scene whole."""
@@ -125,8 +124,3 @@ def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:
         if row and pair[0] != pair[1]:
             found.setdefault(row[1], []).append(f"{re.sub('[_.]', ' ', row[2])} {' → '.join(pair)}")
     return {name: sorted(said) for name, said in sorted(found.items())}
-
-
-PARTS = (
-    FigureOf("response", "mechanism", mechanism_figure, "the mechanism to scale, with its dimensions", 5),
-)  # fmt: skip

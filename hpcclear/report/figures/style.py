@@ -28,6 +28,7 @@ from hpcclear.report.figures.theme import Look as Look
 from hpcclear.report.figures.theme import categories as categories
 from hpcclear.report.figures.theme import colour as colour
 from hpcclear.report.figures.theme import look as look
+from hpcclear.report.parts import FigureOf
 from hpcclear.results import files
 from hpcclear.results.content import Results
 from hpcclear.results.names import DESIGN_VARIABLES, KINDS
@@ -153,6 +154,19 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
     parameters = [*signature.parameters.values(), given]
     styled.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return styled
+
+
+def figure(
+    kind: str, name: str, caption: str | Callable[..., str], order: int = 0, beside: str = "", along: str = ""
+) -> "Callable[[Callable[..., Figure]], Callable[..., Figure]]":  # fmt: skip
+    """Draw a figure as `drawn` does, and declare it as one of results (`hpcclear.report.parts.FigureOf`)."""
+
+    def declared(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
+        made = drawn(function)
+        made.declared = FigureOf(kind, name, made, caption, order, beside, along)  # type: ignore[attr-defined]
+        return made
+
+    return declared
 
 
 def _beside(

@@ -7,14 +7,17 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
 if TYPE_CHECKING:
     from hpcclear.statistics.surrogate.piecewise import Piecewise
 
 
-@style.drawn
+@style.figure(
+    "sensitivity", "sensitivities",
+    "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
+    "from the ranges at which they converged.",
+)  # fmt: skip
 def sensitivity_figure(sensitivity: Results) -> "style.Figure":
     """Sensitivities (kind ``sensitivity``) against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
@@ -62,7 +65,11 @@ def _sensitivity_panel(
     style.key(axes, "upper left", handlelength=1.2, columnspacing=0.6, borderaxespad=0.0)
 
 
-@style.drawn
+@style.figure(
+    "sensitivity", "surface-fit", order=2, caption=fits.captioned(
+        "sensitivity", "Fit of the response surfaces on test points, against clearance and length of the ranges."
+    ),
+)  # fmt: skip
 def fit_figure(sensitivity: Results) -> "style.Figure":
     """Fit of the response surfaces (kind ``sensitivity``) against clearance, a curve for each interval (the paper's Fig. 7)."""
     surfaces = texts_in(sensitivity, "surface")
@@ -94,7 +101,11 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "sensitivity", "sobol",
+    "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
+    "indices (with interactions; their sum may exceed 1).", 1,
+)  # fmt: skip
 def sobol_figure(sensitivity: Results) -> "style.Figure":
     """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors. Raises
     InputError where the file has no Sobol indices."""
@@ -124,7 +135,11 @@ LEVELS = 24
 """Steps of the colour scale of predictions."""
 
 
-@style.drawn
+@style.figure(
+    "kriging", "surrogates", fits.captioned(
+        "kriging", "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance."
+    ),
+)  # fmt: skip
 def surfaces_figure(kriging: Results) -> "style.Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces), of the
     models of two variables and the clearance (kind ``kriging``). Raises InputError where there is none."""
@@ -176,7 +191,10 @@ def _fields(model: "Piecewise", main: int) -> tuple[Array, Array, Array, Array]:
     return x, y, values.reshape(-1, len(x), len(y)), clearances
 
 
-@style.drawn
+@style.figure(
+    "kriging", "parity",
+    fits.captioned("kriging", "Surrogate against simulation: leave-one-out predictions; R² on test points."), 1,
+)  # fmt: skip
 def parity_figure(kriging: Results) -> "style.Figure":
     """Surrogate against dynamics, every model of a file of kind ``kriging`` (the paper's Figs. 6 and 8).
 
@@ -239,35 +257,3 @@ def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
     for k in range(max(used - columns, 0), used):
         axes.flat[k].set_xlabel(label)
         axes.flat[k].tick_params(labelbottom=True)
-
-
-PARTS = (
-    FigureOf(
-        "sensitivity", "sensitivities", sensitivity_figure,
-        "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: from the "
-        "ranges at which they converged.",
-    ),
-    FigureOf(
-        "sensitivity", "sobol", sobol_figure,
-        "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
-        "indices (with interactions; their sum may exceed 1).", 1,
-    ),
-    FigureOf(
-        "sensitivity", "surface-fit", fit_figure,
-        fits.captioned(
-            "sensitivity", "Fit of the response surfaces on test points, against clearance and length of the ranges."
-        ), 2,
-    ),
-    FigureOf(
-        "kriging", "surrogates", surfaces_figure,
-        fits.captioned(
-            "kriging", "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance."
-        ),
-    ),
-    FigureOf(
-        "kriging", "parity", parity_figure,
-        fits.captioned(
-            "kriging", "Surrogate against simulation: leave-one-out predictions; R² on test points."
-        ), 1,
-    ),
-)  # fmt: skip

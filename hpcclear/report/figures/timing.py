@@ -3,11 +3,10 @@
 import numpy as np
 
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
 
-@style.drawn
+@style.figure("timing", "timing", "Time of the ranks, by rank and by stage.")
 def timing_figure(timing: Results) -> "style.Figure":
     """How every rank spent its time, and how much of it each stage took (kind ``timing``)."""
     shown = min(timing.sizes["rank"], 64), timing.sizes["stage"]
@@ -31,8 +30,3 @@ def timing_figure(timing: Results) -> "style.Figure":
         panel.set(xlabel=across, ylabel=f"{along} (–)")
     style.legend(figure, axes[0, 0], "lower", columnspacing=1.0)
     return figure
-
-
-PARTS = (
-    FigureOf("timing", "timing", timing_figure, "Time of the ranks, by rank and by stage."),
-)  # fmt: skip

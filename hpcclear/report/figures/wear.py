@@ -4,11 +4,13 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
 
-@style.drawn
+@style.figure(
+    "wear", "wear",
+    "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
+)  # fmt: skip
 def fan_figure(wear: Results) -> "style.Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
     (kind ``wear``)."""
@@ -36,7 +38,10 @@ def fan_figure(wear: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "wear", "survival",
+    "Survival, with 95 % confidence interval (Clopper and Pearson).", 1,
+)  # fmt: skip
 def survival_figure(wear: Results) -> "style.Figure":
     """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``). Raises InputError
     where no limit was given that could end a life."""
@@ -67,7 +72,10 @@ AGES = 4
 """Ages of a life that profiles are drawn at."""
 
 
-@style.drawn
+@style.figure(
+    "wear", "wear-profile",
+    "Depth of wear around bearings and journals, at several ages (medians over all runs).", 2,
+)  # fmt: skip
 def profile_figure(wear: Results) -> "style.Figure":
     """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``). Raises
     InputError where surfaces wear evenly."""
@@ -98,18 +106,3 @@ def profile_figure(wear: Results) -> "style.Figure":
     if panels:
         style.legend(figure, axes[0, 0], "lower", title="revolutions")
     return figure
-
-
-PARTS = (
-    FigureOf(
-        "wear", "wear", fan_figure,
-        "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
-    ),
-    FigureOf(
-        "wear", "survival", survival_figure, "Survival, with 95 % confidence interval (Clopper and Pearson).", 1
-    ),
-    FigureOf(
-        "wear", "wear-profile", profile_figure,
-        "Depth of wear around bearings and journals, at several ages (medians over all runs).", 2,
-    ),
-)  # fmt: skip
