@@ -190,8 +190,7 @@ def solve_turn(
         hit = [k for k, when in enumerate(piece.t_events) if len(when)]
         if piece.status < 0:
             return (np.nan,) * 4, count
-        turned = len(joints) in hit  # the event after those of the joints
-        if piece.status == 0 or turned:
+        if piece.status == 0 or len(joints) in hit:  # the event after those of the joints
             return _values(scene, one, y, t, peak), count
         for j in (joints[k] for k in hit):
             side[j] = -side[j]

@@ -100,20 +100,14 @@ def draw(scene: Scene, sketch: Path) -> None:
 
 
 def _speeds(scene: Scene) -> list[tuple[str, str]]:
-    """Every angular speed and frequency of the mechanism, a row each."""
-    words = {"rad/s": "speed", "Hz": "frequency"}
-    return [
-        (words[unit], f"{path}: {scene.shown(path)}{_in_turns(scene, path)}")
-        for path in scene.numeric_paths()
-        if (unit := scene.unit(path)) in words
-    ]
-
-
-def _in_turns(scene: Scene, path: str) -> str:
-    """An angular speed that was not written in rpm, in rpm too."""
-    turns = f"{30.0 * scene.number(path) / np.pi:.6g} rpm"
-    other = scene.unit(path) == "rad/s" and not scene.shown(path).endswith("rpm")
-    return f" ({turns})" if other else ""
+    """Every angular speed and frequency of the mechanism, a row each; what was not written in rpm, in rpm too."""
+    words, rows = {"rad/s": "speed", "Hz": "frequency"}, []
+    for path in scene.numeric_paths():
+        if (unit := scene.unit(path)) in words:
+            shown, turns = scene.shown(path), f" ({30.0 * scene.number(path) / np.pi:.6g} rpm)"
+            more = turns if unit == "rad/s" and not shown.endswith("rpm") else ""
+            rows.append((words[unit], f"{path}: {shown}{more}"))
+    return rows
 
 
 def _tables(scene: Scene) -> list[tuple[str, str]]:

@@ -28,9 +28,8 @@ def ages_of(scene: Scene, lives: list[Life]) -> Array:
     """Revolutions (n,) of the curves: evenly to the end of the longest life, and where random inputs of the study are taken."""
     assert scene.wear is not None
     longest = max(one.ended for one in lives) or scene.wear.cycles
-    even = np.linspace(0.0, longest, scene.wear.points)
     asked = [] if scene.study is None else [row.cycles for row in scene.study.worn]
-    return np.union1d(even, np.array(asked, float))
+    return np.union1d(np.linspace(0.0, longest, scene.wear.points), np.array(asked, float))
 
 
 def revolution_times(scene: Scene, inputs: Points | None) -> Array:
@@ -105,14 +104,11 @@ def lives_dataset(
 
 def _curves(found: list[Curves], ages: int, labels: int) -> dict[str, Array]:
     """What lives have at each age, (lives, ages, ...)."""
-    names = {"bearing_depth": "bearing", "journal_depth": "journal"}
-    names |= {name: name for name in ("clearance", "objective")}
     unknown = np.full((ages, labels), np.nan)
-    peaks = [one.peak if one.peak.shape[1] else unknown for one in found]
-    return {
-        **{name: _stacked(found, one) for name, one in names.items()},
-        "peak_contact_force": np.stack(peaks),
-    }
+    depths = {f"{name}_depth": _stacked(found, name) for name in ("bearing", "journal")}
+    others = {name: _stacked(found, name) for name in ("clearance", "objective")}
+    peaks = np.stack([one.peak if one.peak.shape[1] else unknown for one in found])
+    return {**depths, **others, "peak_contact_force": peaks}
 
 
 def _of_lives(lives: list[Life]) -> dict[str, Array]:
@@ -153,10 +149,11 @@ def _reason(one: Life) -> str:
 def _profiles(relief: Relief, found: list[Curves], angles: Array) -> dict[str, Array]:
     """Quantiles over service lives of the depth of both surfaces by the angle, (quantile, cycle, joint, angle), m."""
     aside = relief.around(_stacked(found, "waves"), angles)
-    mean = {"bearing_profile": "bearing", "journal_profile": "journal"}
     return {
-        name: quantiles(_stacked(found, surface)[..., None] + aside[..., k, :], LEVELS)
-        for k, (name, surface) in enumerate(mean.items())
+        f"{surface}_profile": quantiles(
+            _stacked(found, surface)[..., None] + aside[..., k, :], LEVELS
+        )
+        for k, surface in enumerate(("bearing", "journal"))
     }
 
 

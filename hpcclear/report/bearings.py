@@ -95,7 +95,11 @@ def torque(response: Results) -> Torque:
     both = (response[name].values[inside] for name in ("driving_work", "crank_angle"))
     work, angle = (float(one[-1] - one[0]) for one in both)
     swings = abs(angle) < 0.5 * np.ptp(motion.phase(response)[inside])
-    if swings or angle == 0.0 or not _one_drive(response):
+    scene = (
+        scene_of(response) if "drive_phase" in response else None
+    )  # a slider-crank has one drive
+    single = "drive_phase" not in response or (scene and len(scene.linkage.drives) == 1)
+    if swings or angle == 0.0 or not single:
         return Torque(peak, np.nan)
     mean = work / angle
     return Torque(peak, mean if abs(mean) > ROUNDING * peak else 0.0)
@@ -117,12 +121,6 @@ def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
         return np.nan, np.nan
     touching = response["penetration"].values[inside, k] > 0.0
     return float(weight @ response["contact_force"].values[inside, k]), float(weight @ touching)
-
-
-def _one_drive(response: Results) -> bool:
-    """Whether all work is that of a single drive; a slider-crank has no other."""
-    scene = scene_of(response) if "drive_phase" in response else None
-    return "drive_phase" not in response or (scene is not None and len(scene.linkage.drives) == 1)
 
 
 def remarks(response: Results) -> list[tuple[str, str]]:

@@ -60,9 +60,10 @@ class ComparedSignal:
         """
         difference = self.simulated - self.measured
         peaks = [float(np.abs(one).max()) for one in (self.simulated, self.measured)]
+        off, own = (float(np.sqrt(np.mean(x**2))) for x in (difference, self.measured))
         return {
-            "rms": float(np.sqrt(np.mean(difference**2))),
-            "relative_rms": float(np.sqrt(np.mean(difference**2))) / _rms(self.measured),
+            "rms": off,
+            "relative_rms": off / (own or np.nan),
             "largest": float(np.abs(difference).max()),
             "mean": float(difference.mean()),
             "peak": peaks[0] - peaks[1],
@@ -141,7 +142,7 @@ def compare(
     _check_names(names or {}, sheet.signals)
     pairs = [(column, _signal(shown, column, names or {})) for column in sheet.signals]
     measured = [sheet.si(column, one.unit.removesuffix("1"), "heading") for column, one in pairs]
-    simulated = [(_counted if one.counted else _periodic)(place, one.values) for _, one in pairs]
+    simulated = [_curve(place, one) for _, one in pairs]
     how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
     if how == "angle" and axis != "angle":
         remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
@@ -246,20 +247,18 @@ def _signal(response: Results, column: SheetColumn, names: Mapping[str, str]) ->
     return found[match]
 
 
-def _counted(place: Array, values: Array) -> Callable[[Array], Array]:
-    """Events (t,) between the place before and each place, continued with the period of them all."""
-    span, passed = float(place[-1]), np.cumsum(values)
+def _curve(place: Array, signal: Signal) -> Callable[[Array], Array]:
+    """A series between its places (t,), continued with the period of them all; of events (t,) how many there are between the
+    place before and each place."""
+    span, values = float(place[-1]), signal.values
+    if not signal.counted:
+        return lambda at: np.interp(np.mod(at, span), place, values)
+    passed = np.cumsum(values)
 
     def since(at: Array) -> Array:
         return passed[-1] * np.floor(at / span) + np.interp(np.mod(at, span), place, passed)
 
     return lambda at: np.diff(since(at), prepend=since(at[:1]))
-
-
-def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:
-    """A series between its places (t,), continued with the period of them all."""
-    span = float(place[-1])
-    return lambda at: np.interp(np.mod(at, span), place, values)
 
 
 def _best(
@@ -288,7 +287,3 @@ def _correlation(first: Array, second: Array) -> float:
     one, other = first - first.mean(), second - second.mean()
     size = float(np.sqrt((one @ one) * (other @ other)))
     return float(one @ other) / size if size > 0.0 else 0.0
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) or float("nan")

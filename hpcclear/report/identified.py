@@ -53,15 +53,12 @@ def _records(content: Results) -> list[Line]:
             found.append(Line(named(name), before + interval(content, k, u)))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
             found.append(Line("together", before + _together(content, k)))
-        found.append(Line("calibration", before + _calibration(content, k)))
+        share, factor = (content[name].values[k] for name in ("coverage", "widening"))
+        shown = " and ".join(f"{100 * one:.0f} %" for one in share)
+        wider = " and ".join(f"{one:.2g}" for one in factor)
+        text = f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
+        found.append(Line("calibration", before + text))
     return found
-
-
-def _calibration(content: Results, record: int) -> str:
-    share, factor = (content[name].values[record] for name in ("coverage", "widening"))
-    shown = " and ".join(f"{100 * one:.0f} %" for one in share)
-    wider = " and ".join(f"{one:.2g}" for one in factor)
-    return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
 
 
 def _together(content: Results, record: int) -> str:
@@ -115,15 +112,14 @@ def _growth(content: Results) -> list[Line]:
         text = f"{middle} per day (95 % interval {low} to {high}){of}"
         found.append(Line(f"growth, {named(name)}", text))
         if "limit" in content.attrs:
-            days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
+            days = [
+                f"{rounded(float(one) / DAY, '1')} days" if np.isfinite(one) else "never"
+                for one in content["time_to_limit"][:, u]
+            ]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
             found.append(Line(f"time to {limit}, {named(name)}", text))
     return found
-
-
-def _days(seconds: float) -> str:
-    return f"{rounded(seconds / DAY, '1')} days" if np.isfinite(seconds) else "never"
 
 
 def _advice(content: Results) -> list[Line]:

@@ -189,7 +189,7 @@ def _chaos(of: Recommended) -> Iterator[Line]:
     yield Line("chaos", text)
 
 
-def _steadier(of: Recommended) -> Iterator[str]:
+def _steps(of: Recommended) -> Iterator[str]:
     own = of.of_best("chaos")
     if own is not None and float(own["chaos_share"]) > LARGE:
         yield "a larger numerics.averaged_revolutions, since chaotic scatter decreases with it"
@@ -199,5 +199,5 @@ PARTS = (
     LinesOf(20, lines),
     LinesOf(30, _worst),
     LinesOf(40, _indices),
-    LinesOf(80, _chaos, _steadier),
+    LinesOf(80, _chaos, _steps),
 )

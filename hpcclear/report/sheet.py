@@ -184,7 +184,8 @@ def _placed(
         rows, left = block[:most], len(block) - most
         rows += [[_Cell(f"and {left} more, on the page of these results", _SOFT)]] if left else []
         wide = [row for row in rows if len(row) > 1]
-        natural = [max(_natural(one, size) for one in column) for column in zip(*wide, strict=True)]
+        lengths = [[_length(one) * size * POINT / FILLED for one in row] for row in wide]
+        natural = [max(column) for column in zip(*lengths, strict=True)]
         columns = _fitted(natural, INNER - GAP * (len(natural) - 1))
         for row in rows:
             x, top = MARGIN, y
@@ -241,9 +242,9 @@ def _words(text: str) -> list[str]:
     return ["".join(c if font.get_char_index(ord(c)) else "?" for c in word) for word in words]
 
 
-def _natural(cell: _Cell, size: float) -> float:
-    """Width of a text in one line."""
-    return _width(" ".join(_words(cell.text)), cell.bold) * cell.scale * size * POINT / FILLED
+def _length(cell: _Cell) -> float:
+    """Width over size of a cell's text in one line."""
+    return _width(" ".join(_words(cell.text)), cell.bold) * cell.scale
 
 
 def _wrapped(cell: _Cell, width: float, size: float) -> list[str]:

@@ -118,14 +118,12 @@ class _Table:
             self.words[heading] = str(variable.attrs.get("long_name", name))
             if alone:
                 self.single[heading] = one.item()
-            else:
-                self.columns[heading] = self._filled(one)
-                self.keys |= {heading} if name in self.rows else set()
-
-    def _filled(self, one: Variable) -> np.ndarray:
-        """Values of every row, repeated along dimensions that the variable lacks."""
-        sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
-        return np.broadcast_to(one.values.reshape(sizes), self.shape).ravel()
+                continue
+            # of every row, repeated along dimensions that the variable lacks
+            sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
+            whole = np.broadcast_to(one.values.reshape(sizes), self.shape)
+            self.columns[heading] = whole.ravel()
+            self.keys |= {heading} if name in self.rows else set()
 
 
 def _lower_edges(

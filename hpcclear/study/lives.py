@@ -133,17 +133,17 @@ def _values(scene: Scene, row: RandomInput, clearance: Array, endings: Array) ->
     if len(found) < LEAST:
         codes, counts = np.unique(endings[endings != Status.OK], return_counts=True)
         why = Status(int(codes[counts.argmax()])).message if len(codes) else "there are too few"
-        raise InputError(
-            f"{key}.cycles", row.cycles, f"{len(found)} service lives have a clearance at that age: {why}",
-            f"Simulate more service lives, request fewer cycles, or set wear.beyond_limit = true; see {NAME}",
-        )  # fmt: skip
+        reason = f"{len(found)} service lives have a clearance at that age: {why}"
+        remedy = f"Simulate more service lives, request fewer cycles, or set wear.beyond_limit = true; see {NAME}"
+        raise InputError(f"{key}.cycles", row.cycles, reason, remedy)
     lower, upper = scene.required_study.variable(row.name).bounds
     if found.min() < lower or found.max() > upper:
-        raise InputError(
-            f"study.variables.{row.name}.range", (lower, upper),
-            f"service lives have clearances from {found.min():.6g} to {found.max():.6g} m after {row.cycles:g} revolutions",
-            "Widen it to contain them",
-        )  # fmt: skip
+        have = f"service lives have clearances from {found.min():.6g} to {found.max():.6g} m"
+        reason, key = (
+            f"{have} after {row.cycles:g} revolutions",
+            f"study.variables.{row.name}.range",
+        )
+        raise InputError(key, (lower, upper), reason, "Widen it to contain them")
     if len(found) > MOST:  # evenly by rank
         found = np.sort(found)[np.linspace(0, len(found) - 1, MOST).round().astype(int)]
     return np.sort(found)

@@ -83,7 +83,9 @@ class StudyRun:
         arguments: tuple[object, ...],
     ) -> Result:
         found = self.checkpoint.load_stage(name)
-        if found is None or not self._has_samples(int(found["next_sample"])):
+        count = 0 if found is None else int(found["next_sample"])
+        # a file of the samples that a kept stage stands on may be damaged
+        if found is None or len(self.checkpoint.completed(0, count)) != count:
             with context:
                 self.ranks.raise_if_stopped()
                 found = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
@@ -93,10 +95,6 @@ class StudyRun:
                     self.checkpoint.save_stage(name, found)
         self.simulations.next = int(found["next_sample"])
         return {key: value for key, value in found.items() if key != "next_sample"}
-
-    def _has_samples(self, count: int) -> bool:
-        """Whether the samples that a kept stage stands on are there; a file of them may be damaged."""
-        return len(self.checkpoint.completed(0, count)) == count
 
     def write(
         self, content: Results, name: str = "", attributes: Mapping[str, str] | None = None

@@ -140,10 +140,15 @@ def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
     return rare.decided(run, designs, tolerance.verified(run, designs), "verification")
 
 
-def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
-    table, printed = verified.table, printed_moments(run.scene, verified.table.choices)
-    found = verified.true, models.searched, verified.remarks
-    verification.write(run, table, *found, printed, over_life or {})
+def _verified(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
+    table = verified.table
+    found = (
+        verified.true,
+        models.searched,
+        verified.remarks,
+        printed_moments(run.scene, table.choices),
+    )
+    verification.write(run, table, *found, over_life or {})
 
 
 def _worst(run: StudyRun, verified: Verified) -> None:
@@ -233,7 +238,9 @@ STAGES = (
         words={"lives": "wear of the baseline and the best designs"},
         samples=_samples("lives", lives.simulations_of_designs),
     ),
-    Stage("front", _front, needs=("surrogates", "verification", "lives"), writes=("verification",)),
+    Stage(
+        "front", _verified, needs=("surrogates", "verification", "lives"), writes=("verification",)
+    ),
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
         needs=("verification",), writes=("contributions",),

@@ -33,6 +33,11 @@ def _foot(figure: "style.Figure", found: Results, sentence: str = "", *about: st
     figure.supxlabel(labels.literal("\n".join([*lines, *made])), x=0.02, ha="left", wrap=True)
 
 
+def _mark(marker: str, size: float) -> "style.Look":
+    """Marks alone, in the colour of text."""
+    return {"ls": "none", "marker": marker, "ms": size, "color": style.colour("ink")}
+
+
 def _decades(axis: "style.Axis") -> None:
     """Few decade ticks, so that labels do not meet in half a column."""
     from matplotlib.ticker import LogLocator, NullFormatter
@@ -100,10 +105,8 @@ def averaging_figure(accuracy: Results) -> "style.Figure":
     floor = float(accuracy["averaging_floor"])
     if floor > 0.0:
         panel.axhline(floor, color=style.colour("ink"), lw=0.6, ls=(0, (6, 2)))
-        panel.annotate(
-            f"scatter of replicas {floor:.0e}", (0.99, floor), xycoords=("axes fraction", "data"),
-            ha="right", va="bottom",
-        )  # fmt: skip
+        place: style.Look = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
+        panel.annotate(f"scatter of replicas {floor:.0e}", (0.99, floor), **place)
     style.legend(figure, panel, "upper", title="transient revolutions")
     panel.set(xlabel="averaged revolutions (–)", ylabel="relative error of $f$ (–)")
     turn = 1e3 * float(accuracy["turn_seconds"])
@@ -154,16 +157,12 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
             look = {"elinewidth": 0.6, "label": str(estimate), **style.look(k)}
             for column, x in enumerate((accuracy["draws"], one["moment_seconds"])):
                 axes[row, column].errorbar(x.values, y, bars, **look)
+        line: style.Look = {"color": style.colour("ink"), "lw": 0.6, "ls": (0, (6, 2))}
         for panel in axes[row]:
             panel.set(xscale="log", yscale="log")
-            panel.axhline(
-                abs(float(here["moment_bias"])), color=style.colour("ink"), lw=0.6, ls=(0, (6, 2)),
-                label="surrogate's bias",
-            )  # fmt: skip
-        axes[row, 1].axvline(
-            float(accuracy["quadrature_seconds"]), color=style.colour("green"), lw=0.8, ls=":",
-            label="quadrature",
-        )  # fmt: skip
+            panel.axhline(abs(float(here["moment_bias"])), **line, label="surrogate's bias")
+        dots: style.Look = {"color": style.colour("green"), "lw": 0.8, "ls": ":"}
+        axes[row, 1].axvline(float(accuracy["quadrature_seconds"]), **dots, label="quadrature")
         axes[row, 0].set_ylabel(f"relative error of the {moment} (–)")
     axes[-1, 0].set_xlabel("Monte Carlo size (–)")
     axes[-1, 1].set_xlabel("core time (s)")
@@ -217,19 +216,14 @@ def spending_figure(accuracy: Results) -> "style.Figure":
         top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
         top.plot(seconds[k], accuracy["spent_error"].values[k], **{**look, "ls": "none"})
         top.plot([], [], label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""), **look)
-    top.plot(
-        accuracy["cheapest_seconds"], accuracy["aim"], ls="none", marker="*", ms=6.0, color=style.colour("ink"),
-        mfc=style.colour("paper"), label="cheapest to an error",
-    )  # fmt: skip
+    stars = {**_mark("*", 6.0), "mfc": style.colour("paper"), "label": "cheapest to an error"}
+    top.plot(accuracy["cheapest_seconds"], accuracy["aim"], **stars)
     top.set(xlabel="core time, spin-up included (s)", ylabel="relative error of $f$ (–)")
     bias, doubt = (accuracy[name].values for name in ("tolerance_bias", "tolerance_bias_error"))
-    bottom.errorbar(
-        tolerance, np.abs(bias), 2.0 * doubt, ls="none", marker="o", ms=2.8, elinewidth=0.6,
-        color=style.colour(0),
-    )  # fmt: skip
-    bottom.set(
-        xscale="log", yscale="log", xlabel="relative tolerance (–)", ylabel="bias of $f$ (–)"
-    )
+    bars = {**_mark("o", 2.8), "elinewidth": 0.6, "color": style.colour(0)}
+    bottom.errorbar(tolerance, np.abs(bias), 2.0 * doubt, **bars)
+    bottom.set(xscale="log", yscale="log")
+    bottom.set(xlabel="relative tolerance (–)", ylabel="bias of $f$ (–)")
     bottom.invert_xaxis()
     style.legend(figure, top, "upper", title="relative tolerance")
     text = "Marks: measured; lines: bias and variance over revolutions"
@@ -244,15 +238,12 @@ def total_figure(accuracy: Results) -> "style.Figure":
     panel, best = axes[0, 0], targets.front(accuracy)
     beyond = sum(way.error > 0.1 * targets.TARGETS[-1] for way in best)
     best = best[: beyond + 1]  # what is far more accurate than all targets is of no interest
-    panel.loglog(
-        [1e3 * way.seconds for way in best], [way.error for way in best], color=style.colour(0),
-        drawstyle="steps-post", label="cheapest settings",
-    )  # fmt: skip
+    seconds, errors = [1e3 * way.seconds for way in best], [way.error for way in best]
+    steps: style.Look = {"color": style.colour(0), "drawstyle": "steps-post"}
+    panel.loglog(seconds, errors, **steps, label="cheapest settings")
     if (own := targets.settings(accuracy)) is not None:
-        panel.plot(
-            1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.colour("vermilion"),
-            mfc="none", label="your settings", zorder=4,
-        )  # fmt: skip
+        square = {**_mark("s", 9.0), "color": style.colour("vermilion"), "mfc": "none", "zorder": 4}
+        panel.plot(1e3 * own.seconds, own.error, **square, label="your settings")
     # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
     box = panel.dataLim
     panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
@@ -261,10 +252,8 @@ def total_figure(accuracy: Results) -> "style.Figure":
         if (way := targets.cheapest(accuracy, aim)) is not None:
             best_for.setdefault(way, []).append(f"{aim * 100:g}")
     for (way, aims), mark in zip(best_for.items(), "*Dp", strict=False):
-        panel.plot(
-            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=6.0, color=style.colour("ink"), mfc=style.colour("paper"),
-            label=f"for {', '.join(aims)} %", zorder=5,
-        )  # fmt: skip
+        look = {**_mark(mark, 6.0), "mfc": style.colour("paper"), "zorder": 5}
+        panel.plot(1e3 * way.seconds, way.error, **look, label=f"for {', '.join(aims)} %")
     panel.set(xlabel="core time of one design (ms)", ylabel="relative error of $f$ (–)")
     _decades(panel.yaxis)
     _plain(panel)

@@ -24,7 +24,10 @@ def orbit_figure(response: Results) -> "style.Figure":
         contact = shown["penetration"].sel(joint=joint).values > 0.0
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
         look: style.Look = {"color": style.colour("sky"), "lw": 0.7, "label": "free flight"}
-        panel.plot(*_flight(x, y, _rolls(angle, contact)), **look)
+        flown = ~_rolls(angle, contact)  # the path between such instants, in pieces
+        gap = np.full(len(x) - 1, np.nan)
+        pieces = [np.column_stack([c[:-1], c[1:], gap])[flown].ravel() for c in (x, y)]
+        panel.plot(*pieces, **look)
         rolled: style.Look = {"color": style.colour("vermilion"), "lw": 0.7, "label": "contact"}
         panel.plot(*_along(radius, angle, contact), **rolled)
         _circle(panel, clearances[row])
@@ -147,12 +150,6 @@ def _rolls(angle: Array, contact: Booleans) -> Booleans:
     """Whether the journal stays on the bearing from each instant to the next, shape (n - 1,)."""
     found: Booleans = contact[:-1] & contact[1:] & (np.abs(_turned(angle)) <= WIDEST)
     return found
-
-
-def _flight(x: Array, y: Array, rolls: Booleans) -> tuple[Array, Array]:
-    """The path between instants where the journal does not roll, in pieces."""
-    pieces = [np.column_stack([c[:-1], c[1:], np.full(len(c) - 1, np.nan)])[~rolls] for c in (x, y)]
-    return pieces[0].ravel(), pieces[1].ravel()
 
 
 def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array]:

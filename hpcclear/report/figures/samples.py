@@ -32,7 +32,10 @@ def samples_figure(samples: Results) -> "style.Figure":
     cells = [["f", "f", "f", "histogram"], ["spread", "spread", "spread", "."], *pairs]
     figure, axes = style.mosaic(cells, height, height_ratios=[1.5, 0.7, *[1.0] * rows])
     if figure.get_layout_engine() is not None:
-        figure.suptitle(_title(samples), x=0.02, ha="left", wrap=True)
+        failed = int(np.count_nonzero(samples["status"]))
+        latched = int(samples["latched"].values.any(axis=1).sum()) if "latched" in samples else 0
+        text = f"{samples.sizes['sample']} simulations: {failed} failed, {latched} with a joint always in contact"
+        figure.suptitle(text, x=0.02, ha="left", wrap=True)
     first, unit = axes["f"], labels.of(samples["objective"])
     drawn = _cloud(first, main, samples["objective"], main)
     first.set_ylabel(unit.label("objective $f$"))
@@ -113,10 +116,3 @@ def binned(x: Array, y: Array) -> tuple[Array, Array]:
     full = [k for k in range(len(edges) - 1) if (place == k).sum() >= 5]
     middle = 0.5 * (edges[1:] + edges[:-1])
     return middle[full], np.array([np.median(y[place == k]) for k in full])
-
-
-def _title(samples: Results) -> str:
-    count = samples.sizes["sample"]
-    failed = int(np.count_nonzero(samples["status"]))
-    latched = int(samples["latched"].values.any(axis=1).sum()) if "latched" in samples else 0
-    return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"

@@ -40,16 +40,9 @@ def _theme(paper: str, ink: str, faint: str, *curves: str) -> dict[str, str]:
     return papers | dict.fromkeys(inked, ink) | {"grid.color": faint, "axes.prop_cycle": cycle}
 
 
-THEMES = {
-    "light": _theme(
-        *("#ffffff", "#000000", "#dddddd"),
-        *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"),
-    ),
-    "dark": _theme(
-        *("#14181d", "#e6e9ec", "#3a434d"),
-        *("#4a9fe8", "#ff8f4c", "#3fc79a", "#e79fc6", "#a5ddff", "#f2c14e"),
-    ),
-}
+_LIGHT = "#ffffff #000000 #dddddd #0072b2 #d55e00 #009e73 #cc79a7 #56b4e9 #e69f00"
+_DARK = "#14181d #e6e9ec #3a434d #4a9fe8 #ff8f4c #3fc79a #e79fc6 #a5ddff #f2c14e"
+THEMES = {"light": _theme(*_LIGHT.split()), "dark": _theme(*_DARK.split())}
 """Colours by the name of a theme."""
 
 _SIZES = (

@@ -102,7 +102,13 @@ def read(*places: str | Path) -> Content:
     if not files and not responses:
         reason = "there is no result file in it"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
-    every = (*troubles, *_strangers(files))
+    if (
+        len({str(one.attrs["scene_hash"]) for one in files.values() if "scene_hash" in one.attrs})
+        > 1
+    ):
+        text = "The files in this directory were made from different scenes: do not compare them."
+        troubles = [*troubles, text]
+    every = tuple(troubles)
     return Content(place, files, names, responses, every, whole, samples, float(dated))
 
 
@@ -122,11 +128,3 @@ def scene_of(content: Results) -> Scene | None:
 @lru_cache(maxsize=4)
 def _scene(text: str) -> Scene:
     return scene_of_text(text, "scene")
-
-
-def _strangers(files: dict[str, Results]) -> list[str]:
-    """Files that were made from different scenes."""
-    hashes = {str(one.attrs["scene_hash"]) for one in files.values() if "scene_hash" in one.attrs}
-    if len(hashes) > 1:
-        return ["The files in this directory were made from different scenes: do not compare them."]
-    return []

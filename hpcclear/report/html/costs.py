@@ -20,8 +20,10 @@ def accuracy(found: Results, content: Content) -> list[object]:
     """Cheapest settings for three errors in words, then tables; the figures show every other source of error."""
     two, here = ["setting", "result"], "Cheapest integrator for an error of f over one revolution"
     mean = "Cheapest settings for a standard error of f as a steady mean"
-    cheap, integrators = PageTable(two, _cheapest(found), mean), PageTable(two, advice(found), here)
-    tables = [_spending(found), cheap, integrators]
+    wait = f"the {float(found['spin_up']):.0f} transient revolutions of {targets.REPLICAS} replicas"
+    steady = [[f"{100 * aim:.1f} %", cheapest(found, float(aim))] for aim in found["aim"].values]
+    steady.append(["time", f"averaged revolutions and {wait}"])
+    tables = [_spending(found), PageTable(two, steady, mean), PageTable(two, advice(found), here)]
     measured = f"{found.attrs['repeats']}; f: {found.attrs['motion']}."
     return [*targets.sentences(found), measured, folded("Integration and averaging", tables)]
 
@@ -51,14 +53,6 @@ def _known(value: Variable, digits: str) -> str:
     return format(float(value), digits) if np.isfinite(float(value)) else "–"
 
 
-def _cheapest(found: Results) -> Rows:
-    wait = f"the {float(found['spin_up']):.0f} transient revolutions of {targets.REPLICAS} replicas"
-    rows: Rows = [
-        [f"{100 * aim:.1f} %", cheapest(found, float(aim))] for aim in found["aim"].values
-    ]
-    return [*rows, ["time", f"averaged revolutions and {wait}"]]
-
-
 def cheapest(found: Results, aim: float) -> str:
     """Return tolerance, revolutions and core time that reach a relative standard error at the least cost."""
     here = found.isel(aim=int(np.abs(found["aim"].values - aim).argmin()))
@@ -86,10 +80,10 @@ def advice(found: Results) -> Rows:
     return [*rows, ["reference", resolution(found)]]
 
 
-def resolution(found: Results, quantity: str = "objective") -> str:
-    """Return what the reference of one quantity can distinguish, in words."""
-    own = float(found["reference_error"].sel(quantity=quantity))
-    least = float(np.nanmin(found["error"].sel(quantity=quantity)))
+def resolution(found: Results) -> str:
+    """Return what the reference of f can distinguish, in words."""
+    own = float(found["reference_error"].sel(quantity="objective"))
+    least = float(np.nanmin(found["error"].sel(quantity="objective")))
     if own * MARGIN <= least:
         return f"its own error is {own:.0e}, {MARGIN:.0f} times below all errors shown"
     return f"its own error is {own:.0e}: errors below {MARGIN * own:.0e} are not resolved"

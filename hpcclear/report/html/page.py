@@ -70,7 +70,13 @@ def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
 def _page(content: Content) -> str:
     """The whole document."""
     troubles = list(content.troubles)
-    shown = attempt("What the page's script draws", partial(_picture, content), troubles)
+
+    def drawn_by_script() -> dict[str, Any]:
+        made = picture.picture(content)
+        json.dumps(made, allow_nan=False)  # whether JSON can say it: it knows no NaN
+        return made
+
+    shown = attempt("What the page's script draws", drawn_by_script, troubles)
     opened = attempt("The first screen", partial(screen_of, content), troubles)
     first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
     wide = {*first.figures} & {*gallery.WIDE}
@@ -105,13 +111,6 @@ def _page(content: Content) -> str:
 def _readable(name: str) -> str:
     """A file name as text, also one that is no text in this system's encoding."""
     return name.encode("utf-8", "replace").decode()
-
-
-def _picture(content: Content) -> dict[str, Any]:
-    """What the script draws, if JSON can say it: it knows no NaN."""
-    made = picture.picture(content)
-    json.dumps(made, allow_nan=False)
-    return made
 
 
 def _policy() -> str:
