@@ -25,8 +25,7 @@ from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import chaos, extent, responses, run_study
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.claims import ResponseEvidence
-from hpcclear.study.paper.printed import printed_designs
-from hpcclear.study.paper.recognition import is_the_papers
+from hpcclear.study.paper.printed import is_the_papers, printed_designs
 from hpcclear.study.responses import QUANTITIES
 from hpcclear.study.stages import files_of
 

@@ -1,10 +1,8 @@
 """Error of the objective against transient and averaged revolutions, and its lower bound by chaos.
 
 Copies of the scene that differ by tiny perturbations run for a long time, half of them with ten times stricter tolerances.
-Where
-motion is periodic they come to agree; where it is chaotic they part, and each sees another interval of the same
-attractor; where the damping keeps an old impact speed they can settle on different orbits for good. The last is an
-error
+Where motion is periodic they come to agree; where it is chaotic they part, and each sees another interval of the same
+attractor; where the damping keeps an old impact speed they can settle on different orbits for good. The last is an error
 that no average removes: the scatter of the copies' long averages.
 """
 
@@ -47,13 +45,9 @@ def analyse(gaps: Array, seconds: float) -> Variables:
     late = objective(gaps[half:].mean(axis=0))  # (copies,)
     truth = late.mean()
     error = np.array([[_error(gaps, t, a, truth) for a in averaged] for t in transient])
-    return {
-        "transient": transient,
-        "averaged": averaged,
-        "averaging_error": error,
-        "averaging_floor": np.array(late.std(ddof=1) / truth),
-        "turn_seconds": np.array(seconds),
-    }
+    floor = np.array(late.std(ddof=1) / truth)
+    found = {"transient": transient, "averaged": averaged, "averaging_error": error}
+    return found | {"averaging_floor": floor, "turn_seconds": np.array(seconds)}
 
 
 def doubling(most: int, start: int) -> Integers:

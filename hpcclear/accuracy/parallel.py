@@ -31,14 +31,10 @@ def measure(
     strong = np.array([_timed(scene, case, samples, int(n), ranks) for n in numbers])
     last = ranks.stage_seconds[_stage(int(numbers[-1]), samples)]
     weak = np.array([_timed(scene, case, each * int(n), int(n), ranks) for n in numbers])
-    total = sum(ranks.stage_seconds.values())
-    column = {name: k for k, name in enumerate(COLUMNS)}
-    lost = [
-        process_age_at_start() * ranks.size,
-        float(total[:, column["compile"]].sum()),  # type: ignore[call-overload,index]
-        float(last[:, column["idle"]].sum()),
-        float(total[:, column["write"]].sum()),  # type: ignore[call-overload,index]
-    ]
+    total = sum(ranks.stage_seconds.values(), np.zeros_like(last))
+    compiling, writing = (float(total[:, COLUMNS.index(k)].sum()) for k in ("compile", "write"))
+    waiting = float(last[:, COLUMNS.index("idle")].sum())
+    lost = [process_age_at_start() * ranks.size, compiling, waiting, writing]
     return {
         "ranks": numbers.astype(np.int64),
         "loss": np.array(LOSSES),

@@ -23,15 +23,11 @@ def with_case(scene: Scene) -> tuple[Scene, str, str]:
         scene = scene.with_({"study": {"seed": 1, "variables": _variables(scene)}})
         where = f"no study in the scene: variables within {100 * WIDTH:.0f} % of its values"
     assert scene.study is not None
-    names = scene.study.optimisation
-    widths = {
-        row.name: SHARE * (row.range[1] - row.range[0])
-        for row in scene.study.variables
-        if row.range is not None and row.name in names
-    }
-    random: dict[str, object] = {
-        name: {"distribution": "uniform", "half_width": width} for name, width in widths.items()
-    }
+    names, random = scene.study.optimisation, dict[str, object]()
+    for row in scene.study.variables:
+        if row.range is not None and row.name in names:
+            width = SHARE * (row.range[1] - row.range[0])
+            random[row.name] = {"distribution": "uniform", "half_width": width}
     changes = {"study.random": random, "study.cases": {CASE: list(random)}}
     return _by_quadrature(scene.with_(changes)), CASE, where
 

@@ -32,12 +32,10 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     if not points:
         reason = "no entry is varied"
         raise InputError("points", {}, reason, "Give at least one name and its values")
-    columns = {
-        str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
-    }
-    values = np.column_stack(np.broadcast_arrays(*columns.values()))
-    paths = tuple(paths_of(scene, name) for name in columns)
-    made = Points(tuple(columns), values, paths)
+    names = tuple(map(str, points))
+    columns = (np.atleast_1d(np.asarray(values, float)) for values in points.values())
+    values = np.column_stack(np.broadcast_arrays(*columns))
+    made = Points(names, values, tuple(paths_of(scene, name) for name in names))
     check_points(scene, made)
     return made
 
@@ -78,6 +76,5 @@ def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Datas
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)
-    made = scene.origin | program()
-    attributes = made | recorded(scene, records)
-    return samples_of(designs, records, attributes, scene.objective, scene.joint_labels).to_xarray()
+    about = scene.origin | program() | recorded(scene, records), scene.objective, scene.joint_labels
+    return samples_of(designs, records, *about).to_xarray()

@@ -191,10 +191,11 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
     count = min(FIRST, book.plan.most)
     pending = [one for one in variants if book.replicates(one) < count]
     while pending:
-        asked = [
-            VariantRequest(one, done, count) for one in dict.fromkeys([(), *pending])
-            if (done := book.replicates(one)) < count
-        ]  # fmt: skip
+        every = (
+            VariantRequest(one, book.replicates(one), count)
+            for one in dict.fromkeys([(), *pending])
+        )
+        asked = [one for one in every if one.first < count]
         for one, seen in zip(asked, (yield asked), strict=True):
             book.seen.setdefault(one.off, []).append(seen)
         pending = [one for one in pending if one and _decidable(book, one)]
@@ -266,10 +267,8 @@ def _may_pass(book: Book, chosen: Variant) -> bool:
 
 def _recommended(book: Book) -> Variant:
     """Of all that was simulated and passes the largest, unless another one is much cheaper; () where none does."""
-    passed = [
-        one for one in book.seen
-        if one and book.verdict(one) is Verdict.HOLDS and book.work(one) <= MORE_WORK
-    ]  # fmt: skip
+    cheap = (one for one in book.seen if one and book.work(one) <= MORE_WORK)
+    passed = [one for one in cheap if book.verdict(one) is Verdict.HOLDS]
     if not passed:
         return ()
     least = min(book.work(one) for one in passed)

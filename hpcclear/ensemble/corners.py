@@ -54,9 +54,8 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     """What the corners of a study's ranges come to; with `simulate` those that make a mechanism run two revolutions."""
     points = corners(scene)
     plain = scene.with_({"study": None})
-    moving = [
-        any(moves_geometry(scene.path_in_linkage(path)) for path in paths) for paths in points.paths
-    ]
+    own = (map(scene.path_in_linkage, paths) for paths in points.paths)
+    moving = [any(map(moves_geometry, paths)) for paths in own]
     locked = dict[bytes, str]()  # by what decides whether a design can turn: most corners share it
     refused = dict[int, str]()
     doubted = bool(_refusal(plain, points))
@@ -72,10 +71,8 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     if simulate and good.size:
         from hpcclear.dynamics.evaluation import evaluate_records  # with all that compiles
 
-        brief = {
-            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None,
-            "max_steps": min(STEPS, scene.numerics.max_steps),
-        }  # fmt: skip
+        brief: dict[str, object] = {"transient_revolutions": 1, "averaged_revolutions": 1}
+        brief |= {"target_error": None, "max_steps": min(STEPS, scene.numerics.max_steps)}
         short = scene.with_({f"numerics.{name}": value for name, value in brief.items()})
         status[good] = evaluate_records(short, points.take(good))["status"]
     return CornerOutcomes(points, refused, status)

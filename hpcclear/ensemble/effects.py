@@ -13,7 +13,7 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.setup.problem import coordinate_count
-from hpcclear.ensemble.certificate import Certificate, Changes, Screening, VariantResult, judged
+from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult, judged
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import Finished, Options, Place, Session
@@ -26,7 +26,6 @@ from hpcclear.results.content import Results
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.statistics.random.paired import Change
 
 SAMPLES = 4096
 """Samples of a variant at most, unless another number is requested."""
@@ -71,9 +70,8 @@ def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
 
     def simulate(variant: Scene, design: Points) -> Records:
         nonlocal first
-        records = sample_points(
-            variant, design, session.ranks, checkpoint, stage="effects", first=first
-        )
+        where = session.ranks, checkpoint
+        records = sample_points(variant, design, *where, stage="effects", first=first)
         first += len(design)
         return records
 
@@ -105,41 +103,33 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     changes = [book.changes(off) for off in variants]
     counted = np.array([True, plan.scattered, plan.forces])
     reduced = trial.variant(found.recommended).scene
+    three = [(one.mean, one.deviation, one.force) for one in changes]
+    seen = [book.all(off) for off in variants]
+    findings = [[int(judged([one], plan.tolerance)) for one in own] for own in three]
     data: dict[str, Array] = {
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
-        "change": np.array([[one.value for one in _three(c)] for c in changes]),
-        "limit": np.array([[one.limit for one in _three(c)] for c in changes]),
-        "finding": np.array(
-            [[int(judged([one], plan.tolerance)) for one in _three(c)] for c in changes], np.int8
-        ),
+        "change": np.array([[one.value for one in own] for own in three]),
+        "limit": np.array([[one.limit for one in own] for own in three]),
+        "finding": np.array(findings, np.int8),
         "decision": np.array([int(book.verdict(off)) for off in variants], np.int8),
-        "point_change": np.array([c.point for c in changes]),
+        "point_change": np.array([one.point for one in changes]),
         "judged": counted.astype(np.int8),
         "recommended": np.array([off == found.recommended for off in variants], np.int8),
         "work": np.array([book.work(off) for off in variants]),
-        "evaluations": np.array([float(book.all(off).evaluations.mean()) for off in variants]),
+        "evaluations": np.array([float(one.evaluations.mean()) for one in seen]),
         "coordinates": np.array([coordinate_count(trial.variant(off).scene) for off in variants]),
-        "samples": np.array([book.all(off).objective.size for off in variants]),
-        "failed": np.array([int(np.isnan(book.all(off).objective).sum()) for off in variants]),
-        "objective": np.array([_mean(book.all(off).objective) for off in variants]),
+        "samples": np.array([one.objective.size for one in seen]),
+        "failed": np.array([int(np.isnan(one.objective).sum()) for one in seen]),
+        "objective": np.array([_mean(one.objective) for one in seen]),
     }
     coords = {
         "variant": np.arange(len(variants)),
         "effect": np.array([one.name for one in trial.switches], dtype=str),
         "response": np.array(RESPONSES, dtype=str),
     }
-    attrs = {
-        **attributes,
-        "tolerance": plan.tolerance,
-        "confidence": plan.confidence,
-        "reduced_scene": reduced.to_toml(),
-        "kept": json.dumps(trial.kept),
-    }
+    attrs = {**attributes, "tolerance": plan.tolerance, "confidence": plan.confidence}
+    attrs |= {"reduced_scene": reduced.to_toml(), "kept": json.dumps(trial.kept)}
     return dataset.dataset("effects", coords, data, attrs, objective=trial.scene.objective)
-
-
-def _three(changes: Changes) -> tuple[Change, Change, Change]:
-    return changes.mean, changes.deviation, changes.force
 
 
 def _mean(values: Array) -> float:

@@ -27,12 +27,8 @@ def content_of(scene: "Scene") -> dict[str, Any]:
     """
     content = scene.resolved()
     content.pop("study", None)
-    content["numerics"] |= {
-        "responses": scene.responses_asked(),
-        "impacts": scene.impacts_asked(),
-        "levels": scene.bands(),
-        "objective": scene.objective.name,
-    }
+    content["numerics"] |= {"responses": scene.responses_asked(), "impacts": scene.impacts_asked()}
+    content["numerics"] |= {"levels": scene.bands(), "objective": scene.objective.name}
     return content
 
 

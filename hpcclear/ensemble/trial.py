@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -78,28 +79,22 @@ class Drawn:
         if self._scene.study is None:
             return self._vicinity(first, count)
         each, purpose = 1 if self.scattered else self.size, "designs of effects"
-        designs = monte_carlo(
-            self._scene, count * each, random=(), purpose=purpose, replicate=0, first=first * each
-        )
+        draw = partial(monte_carlo, self._scene)
+        begin = partial(draw, count * each, replicate=0, first=first * each)
+        designs = begin(random=(), purpose=purpose)
         if not self.scattered:
             return designs
-        parts = [
-            monte_carlo(
-                self._scene, self.size, purpose="effects", replicate=first + k,
-                design=dict(zip(designs.names, row.tolist(), strict=True)),
-            )
-            for k, row in enumerate(designs.values)
-        ]  # fmt: skip
+        rows = (dict(zip(designs.names, row, strict=True)) for row in designs.values.tolist())
+        about = partial(draw, self.size, purpose="effects")
+        parts = [about(replicate=first + k, design=row) for k, row in enumerate(rows)]
         return Points(parts[0].names, np.concatenate([one.values for one in parts]), parts[0].paths)
 
     def _vicinity(self, first: int, count: int) -> Points:
         scene = self._scene
         paths = [f"{scene.joint_key(name)}.clearance" for name in scene.clearance_joints()]
         own = np.array([scene.number(path) for path in paths])
-        rows = [
-            generator(0, "effects", str(first + k)).uniform(-1.0, 1.0, (self.size, len(paths)))
-            for k in range(count)
-        ]
+        streams = (generator(0, "effects", str(first + k)) for k in range(count))
+        rows = [one.uniform(-1.0, 1.0, (self.size, len(paths))) for one in streams]
         values = own * (1.0 + VICINITY * np.concatenate(rows))
         return Points(tuple(paths), values, tuple((path,) for path in paths))
 

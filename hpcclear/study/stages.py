@@ -36,8 +36,7 @@ from hpcclear.study import (
 from hpcclear.study.certificate import Extent
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper import claims, readings
-from hpcclear.study.paper.printed import printed_designs, printed_moments
-from hpcclear.study.paper.recognition import is_the_papers
+from hpcclear.study.paper.printed import is_the_papers, printed_designs, printed_moments
 from hpcclear.study.run import Result, StudyRun
 
 

@@ -14,8 +14,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
 from hpcclear.statistics.random.replicates import student
-from hpcclear.study.paper.printed import CLAIMS, case_names
-from hpcclear.study.paper.recognition import own_names
+from hpcclear.study.paper.printed import CLAIMS, case_names, own_names
 from hpcclear.study.responses import QUANTITIES, STATISTICS
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.sensitivities import surfaces

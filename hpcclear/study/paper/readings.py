@@ -25,8 +25,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import moments
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.paper.printed import printed_designs, printed_moments
-from hpcclear.study.paper.recognition import own_names
+from hpcclear.study.paper.printed import own_names, printed_designs, printed_moments
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.truth import samples_of, scattered, scrambled_length
 
