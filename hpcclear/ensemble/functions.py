@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -22,22 +21,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@contextmanager
-def _place(output: str | Path | None) -> Iterator[Path]:
-    """Where a command writes, a folder that is removed where its file is not wanted."""
-    if output is not None:
-        yield Path(output)
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        yield Path(folder) / "result.nc"
-
-
 def in_process(
     run: Callable[[Path, Ranks, Options], Finished], output: str | Path | None, progress: str
 ) -> xr.Dataset:
-    """What a command writes, carried out in this process: `run` gets the place, this process, and options."""
-    with _place(output) as place:
-        return run(place, alone(), Options(style=cast(Style, progress))).content.to_xarray()
+    """What a command writes, carried out in this process: `run` gets the place, this process, and options. Where the file is
+    not wanted, its place is a folder that is removed."""
+    options = Options(style=cast(Style, progress))
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / "result.nc" if output is None else Path(output)
+        return run(place, alone(), options).content.to_xarray()
 
 
 def map(

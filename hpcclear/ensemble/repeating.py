@@ -44,23 +44,18 @@ def repeated(place: Path, count: int) -> Iterator[Repeated]:
     Yields the outcome of each file that was read, in order; of a damaged one in a directory, too.
     Raises InputError: there is no result file; or `place` is a file that is damaged, or was made from no valid scene.
     """
-    if not place.is_dir():
-        yield from _repeated(dataset.read(place), str(place), count)
-        return
-    for path, content in dataset.each_in(place):
-        name = str(path.relative_to(place))
+    every = place.is_dir()
+    for path, content in dataset.each_in(place) if every else [(place, dataset.read(place))]:
+        name = str(path.relative_to(place) if every else path)
         try:
-            yield from _repeated(content, name, count)
+            if isinstance(content, InputError):
+                raise content
+            if (kind := str(content.attrs["hpcclear_kind"])) in REPEATED:
+                yield _compared(name, content, kind, count)
         except InputError as error:
+            if not every:
+                raise
             yield Repeated(name, f"not simulated: {error.reason}", unread=True)
-
-
-def _repeated(content: Results | InputError, name: str, count: int) -> Iterator[Repeated]:
-    if isinstance(content, InputError):
-        raise content
-    kind = str(content.attrs["hpcclear_kind"])
-    if kind in REPEATED:
-        yield _compared(name, content, kind, count)
 
 
 def _compared(name: str, content: Results, kind: str, count: int) -> Repeated:

@@ -1,5 +1,6 @@
 """The effect screening as a stage of a study: which effects it could do without."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -25,14 +26,10 @@ def certify(run: StudyRun, extent: Extent) -> None:
     """
     asked = run.study.certificate
     assert asked is not None
-    trial = Trial(run.scene)
-    count = 0
+    trial, numbers = Trial(run.scene), itertools.count(1)
 
     def simulate(scene: Scene, points: Points) -> Records:
-        nonlocal count
-        count += 1
-        kept = run.part(f"effects-{count}", _simulated, scene, points)
-        return _records(kept)
+        return _records(run.part(f"effects-{next(numbers)}", _simulated, scene, points))
 
     run.announce("effects")
     with run.ranks.stage("effects"):

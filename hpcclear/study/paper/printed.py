@@ -19,7 +19,7 @@ from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.study.optimisation import Choice
 
 SYMBOLS = ("m1", "u1", "I1", "m2", "u2", "I2", "m3", "C")
-"""Of its Table 3; what each is of the mechanism: `hpcclear.scene.variables.SHORT_NAMES`."""
+"""Of its Table 3; what each is of the mechanism: `hpcclear.scene.named.SHORT_NAMES`."""
 
 _SPEED = 5000.0 * 2.0 * math.pi / 60.0  # rad/s
 
