@@ -106,13 +106,13 @@ def _columns(lines: spread.Lines, units: Units) -> dict[str, list[object]]:
     }
     shown = [unit or si for (_, si), unit in rows.items()]
     columns: dict[str, list[object]] = {"statistic": [label for label, _ in rows], "unit": [*shown]}
+    nothing = spread.Line("", "")
     for name, own in lines.items():
         for k, end in enumerate(spread.StatedValue._fields[:3]):
             cells = columns[f"{name} {end}"] = []
             for (label, si), unit in rows.items():
-                line = own.get(label)
-                same = line is not None and line.estimate.unit == si
-                number = line.estimate.ends[k] if line is not None and same else math.nan
+                found = own.get(label, nothing).estimate
+                number = found.ends[k] if found.unit == si else math.nan
                 cells.append(number / float(factor(unit, si)) if unit else number)
     return columns
 

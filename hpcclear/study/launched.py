@@ -25,12 +25,8 @@ def launch(scene: Scene, directory: Path, ranks: int, *, fresh: bool, progress_s
     finished is on disk); RuntimeError, which ends with what it printed last, if it failed.
     """
     program = _mpiexec(ranks)
-    content = {
-        "text": scene.text,
-        "directory": str(directory),
-        "fresh": fresh,
-        "style": "log" if progress_style == "auto" else progress_style,
-    }
+    style = "log" if progress_style == "auto" else progress_style
+    content = {"text": scene.text, "directory": str(directory), "fresh": fresh, "style": style}
     with tempfile.TemporaryDirectory() as folder:
         job = Path(folder) / "job.json"
         job.write_text(json.dumps(content), encoding="utf-8")

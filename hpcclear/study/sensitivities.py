@@ -1,6 +1,7 @@
 """Response surfaces, first-order sensitivities against clearance, and global indices."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -125,16 +126,11 @@ def _layouts(study: Study) -> list[IntervalSettings]:
         together = k == len(study.groups)
         order = settings.together_order if together else settings.order
         points = settings.together_samples if together else settings.samples
-        found.append(
-            IntervalSettings(
-                steps=settings.rounds,
-                shrink=settings.shrink,
-                n_points=points,
-                n_test=max(settings.test_samples, 20) if together else settings.test_samples,
-                order=order,
-                chosen=settings.chooses(len(names), order, points),
-            )
-        )
+        tests = max(settings.test_samples, 20) if together else settings.test_samples
+        sizes = {"n_points": points, "n_test": tests, "order": order}
+        chosen = settings.chooses(len(names), order, points)
+        made = partial(IntervalSettings, steps=settings.rounds, shrink=settings.shrink)
+        found.append(made(**sizes, chosen=chosen))
     return found
 
 
@@ -273,15 +269,12 @@ def _searched(
     for k, level in places:
         design = sampled[k].design
         laid_out = design.settings
+        count, order = laid_out.n_points, laid_out.order
+        most, tests = count * 2**settings.resamplings, max(laid_out.n_test, 20)
         tried = SearchSettings(
-            orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
-            n_points=2 * laid_out.n_points,
-            n_test=max(laid_out.n_test, 20),
-            max_points=laid_out.n_points * 2**settings.resamplings,
-            r2_min=settings.r2,
-            rmae_max=settings.rmae,
-            chosen=laid_out.chosen,
-        )
+            orders=(order, order + 1, max(order - 1, 1)), n_points=2 * count, n_test=tests, max_points=most,
+            r2_min=settings.r2, rmae_max=settings.rmae, chosen=laid_out.chosen,
+        )  # fmt: skip
         rng = run.rng("surface", " ".join(sampled[k].inputs), str(level))
         searches.append(SurfaceSearch(design.intervals[0], rng, tried))
 

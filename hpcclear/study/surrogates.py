@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -57,25 +58,27 @@ def fit_all(run: StudyRun) -> Result:
         region, settings = domain(run, names), run.study.surrogate
         begins = tuple(names) == run.study.models[-1] and run.study.verification.infill_rounds > 0
         more = int(not begins)  # the search by simulation is not better for a better start
+        wanted = SubintervalSettings(
+            samples=run.study.samples,
+            test_samples=_tests(run.study),
+            r2_min=settings.r2,
+            rmae_max=settings.rmae,
+            max_resamples=more if settings.resamplings is None else settings.resamplings,
+            max_depth=more if settings.cuts is None else settings.cuts,
+        )
         model = fit_subintervals(
-            lambda points, names=names: run.simulations.values(names, points, STAGE),  # type: ignore[misc]
-            np.column_stack([region.lower, region.upper]),
-            SubintervalSettings(
-                samples=run.study.samples,
-                test_samples=_tests(run.study),
-                r2_min=settings.r2,
-                rmae_max=settings.rmae,
-                max_resamples=more if settings.resamplings is None else settings.resamplings,
-                max_depth=more if settings.cuts is None else settings.cuts,
-            ),
-            method=method,
-            rng=run.rng("kriging", " ".join(names)),
+            partial(_simulated, run, names), np.column_stack([region.lower, region.upper]), wanted,
+            method=method, rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
             snap=partial(snapped, run.study, names, model=True),
-        )
+        )  # fmt: skip
         result |= {f"model{k}_{name}": array for name, array in arrays_of(model).items()}
         result |= _checked(run, k, model)
     return result
+
+
+def _simulated(run: StudyRun, names: Sequence[str], points: Array) -> Array:
+    return run.simulations.values(names, points, STAGE)
 
 
 def simulations(study: Study) -> int:

@@ -15,6 +15,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.merit import recommended
 from hpcclear.report.parts import FigureOf, declared
+from hpcclear.report.screen import upper
 from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
@@ -108,15 +109,14 @@ def _of_responses(
     yield MECHANISM, "response", caption, draw
     name = "original" if "original" in found else next(iter(found))
     of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
+    files = {"response": found[name]}
     if len(found) == 1:
         caption = f"Response over two revolutions{_clearances(found[name])}."
         draw = functools.partial(response.response_figure, found[name])
         yield "response", "response", caption, draw
     for one in catalogue.of_response(found[name]):
         if one.name in OF_RESPONSE:
-            about = of + one.captioned({"response": found[name]})
-            draw = functools.partial(one.draw, found[name])
-            yield one.name, "response", f"{about[0].upper()}{about[1:]}.", draw
+            yield one.name, "response", f"{upper(of + one.captioned(files))}.", one.of(files)
 
 
 def _png(draw: "Callable[[], Figure]") -> str | None:
@@ -132,12 +132,11 @@ def _png(draw: "Callable[[], Figure]") -> str | None:
 
 def _clearances(*responses: Results) -> str:
     """At which clearances these were simulated, where that is the same for all."""
-    parts: list[str] = []
     if any("penetration" not in one for one in responses):  # of ideal joints
         return ""
-    for joint, name in enumerate(motion.joints(responses[0])):
-        known = [motion.clearances(one)[joint] for one in responses]
-        shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}
+    parts, known = list[str](), np.array([motion.clearances(one) for one in responses]).T
+    for name, own in zip(motion.joints(responses[0]), known, strict=True):
+        shown = {labels.quantity(float(c), "m") for c in own if np.isfinite(c)}
         if len(shown) == 1:
             parts.append(f"{shown.pop()} in {name}")
     return f", at radial clearances of {' and '.join(parts)}" if parts else ""

@@ -27,9 +27,7 @@ class PageTable:
     def __init__(
         self, header: Sequence[object], rows: Iterable[Sequence[object]], caption: str
     ) -> None:
-        self.header = list(header)
-        self.rows = [list(row) for row in rows]
-        self.caption = caption
+        self.header, self.rows, self.caption = list(header), [list(row) for row in rows], caption
 
 
 def preformatted(text: str) -> dict[str, object]:
