@@ -92,7 +92,7 @@ def spread_out(scene: Scene, seed: int) -> list[Choice]:
 def truths(scene: Scene, designs: list[Choice], count: int) -> np.ndarray:
     """Values and standard errors of mean, deviation and percentile by a strict tolerance, (n, 3, 2)."""
     run = run_of(scene.with_({"numerics.rtol": STRICT}))
-    made = truth.looked_at(run, designs, "truth", "truth", count // REPLICATES)
+    made = truth.drawn(run, designs, "truth", count // REPLICATES)
     return np.array(
         [
             [

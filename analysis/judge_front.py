@@ -54,7 +54,7 @@ def main() -> None:
 def simulated(scene: Scene, designs: list[Choice], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean and deviation, (n, 2), and what each replicate shifts them by, (2, n, 16)."""
     run = run_of(scene)
-    made = truth.looked_at(run, designs, "judge", "judge", count // REPLICATES)
+    made = truth.drawn(run, designs, "judge", count // REPLICATES)
     found = truth.results_of(run, designs, made)
     values = np.column_stack([found["mean"], found["deviation"]])
     return values, np.stack([found["mean_shifts"], found["deviation_shifts"]])

@@ -48,13 +48,11 @@ def coverage(scene: Scene, choice: Choice, repeats: int, most: int) -> None:
     """Print in how many repeats each limit holds."""
     run = run_of(scene)
     settings = run.study.verification
-    whole = truth.results_of(
-        run, [choice], truth.looked_at(run, [choice], "truth", "truth", most // REPLICATES)
-    )
+    whole = truth.results_of(run, [choice], truth.drawn(run, [choice], "truth", most // REPLICATES))
     exact = [float(whole[name][0]) for name in WORDS]
     held, spent = np.zeros(3, int), 0
     for k in range(repeats):
-        made = truth.looked_at(run, [choice], "repeat", f"repeat {k}", truth.first_length(settings))
+        made = truth.drawn(run, [choice], f"repeat {k}", truth.first_length(settings))
         found = truth.results_of(run, [choice], truth.made(run, [choice], made))
         spent += int(found["samples"][0])
         for j, name in enumerate(WORDS[:2]):
@@ -77,10 +75,8 @@ def cost(scene: Scene, designs: int = 10, count: int = 1024) -> None:
         Choice("", CASE, {name: float(points.column(name)[k]) for name in names})
         for k in range(designs)
     ]
-    found = truth.results_of(
-        run, rows, truth.looked_at(run, rows, "cost", "cost", count // REPLICATES)
-    )
-    draws = [truth.samples_of(run, row, 4096, "draws") for row in rows]
+    found = truth.results_of(run, rows, truth.drawn(run, rows, "cost", count // REPLICATES))
+    draws = [truth.scattered(run, row, 4096, "draws", None) for row in rows]
     normal = student(0.95, 10**6)
     gains = []
     for k, one in enumerate(draws):

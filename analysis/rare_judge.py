@@ -110,7 +110,7 @@ def own(name: str) -> Scene:
     (case,) = scene.required_study.cases
     choice = regret.choice_at(scene, [0.5] * len(scene.required_study.design_variables(case.name)))
     run = run_of(scene)
-    made = truth.looked_at(run, [choice], "limit", "limit", LENGTH)
+    made = truth.drawn(run, [choice], "limit", LENGTH)
     found = truth.results_of(run, [choice], made)
     limit = float(found["mean"][0] + of_share(most) * found["deviation"][0])
     row = {"statistic": "exceedance", "limit": float(f"{limit:.4g}"), "most": most}

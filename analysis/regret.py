@@ -359,7 +359,7 @@ def judged(scene: Scene, choices: list[Choice]) -> tuple[np.ndarray, np.ndarray,
     run, length = run_of(scene), JUDGED // REPLICATES
     made = [truth.nothing(run)] * len(choices)
     while True:
-        truth.lengthen(run, choices, made, range(len(made)), "judge", "judge", length)
+        truth.lengthen(run, choices, made, range(len(made)), "judge", length)
         values, shifts, broken = merits(scene, choices, truth.results_of(run, choices, made))
         least = int(np.where(broken, np.inf, values).argmin())
         errors = spread(shifts - shifts[least]) / abs(values[least])
@@ -407,7 +407,7 @@ def evaluated(scene: Scene, points: Points) -> np.ndarray:
 def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict[str, np.ndarray]:
     """What designs come to by so many points of each scrambling."""
     run = run_of(scene)
-    return truth.results_of(run, choices, truth.looked_at(run, choices, purpose, purpose, length))
+    return truth.results_of(run, choices, truth.drawn(run, choices, purpose, length))
 
 
 def reference(scene: Scene, case: str, rounds: int, start: np.ndarray) -> np.ndarray:

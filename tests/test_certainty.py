@@ -165,15 +165,15 @@ def raced(monkeypatch, contest: int, origin: str = "search", last: str = "") -> 
         choices[2] = Choice(last, "one", {"m2": 0.22}, origin="given")
     rng = np.random.default_rng(6)
 
-    def drawn(run, some, stage, purpose, count, first):
+    def drawn(run, some, stage, count, first=0):
         widths = [(0.1, 0.1005, 0.2)[choices.index(one)] for one in some]
         return [
             np.stack([1.0 + w * rng.standard_normal((16, count)), np.zeros((16, count))])
             for w in widths
         ]
 
-    monkeypatch.setattr(truth, "_values", drawn)
-    made = drawn(run, choices, "", "", 32, 0)
+    monkeypatch.setattr(truth, "drawn", drawn)
+    made = drawn(run, choices, "", 32)
     return [one[0].size for one in truth.made(run, choices, made)]
 
 

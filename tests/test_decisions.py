@@ -23,6 +23,7 @@ from hpcclear.results import dataset
 from hpcclear.results.content import Results, each
 from hpcclear.scene.cases import Constraint
 from hpcclear.scene.stages import Verification
+from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import failures, goals, tolerance, verdicts
 from hpcclear.study.optimisation import Choice
 
@@ -55,21 +56,21 @@ def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
 def test_what_is_not_decided_has_a_price():
     """Half the reach needs four times the simulations; where nothing was exceeded the upper limit falls as one over them."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
-    one = goals.GoalValue(0.008, 0.004, 0.012, np.zeros(16))
+    one = Limited(0.008, np.zeros(16), 0.004, 0.012)
     assert verdicts.of_interval(goal, one, 2048, 0.95) == (Verdict.UNDECIDED, 8192.0)
     none = goals.goal_value(goal, np.zeros((16, 8)), {}, 0.95)
     found = verdicts.of_interval(goal, none, 128, 0.95)
     assert found == (Verdict.UNDECIDED, 512.0)  # 368, by doubling
     enough = goals.goal_value(goal, np.zeros((16, 32)), {}, 0.95)
     assert verdicts.of_interval(goal, enough, 512, 0.95).verdict is Verdict.HOLDS
-    at = goals.GoalValue(0.01, 0.004, 0.012, np.zeros(16))
+    at = Limited(0.01, np.zeros(16), 0.004, 0.012)
     assert np.isnan(verdicts.of_interval(goal, at, 2048, 0.95).price)
 
 
 def test_what_the_tolerance_leaves_open_no_simulations_decide():
     """Of a half-width of 4e-3 the tolerance has half: what is left to the samples falls to 0, or is not enough."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
-    near, far = (goals.GoalValue(x, 0.0, x + 0.004, np.zeros(16)) for x in (0.0085, 0.007))
+    near, far = (Limited(x, np.zeros(16), 0.0, x + 0.004) for x in (0.0085, 0.007))
     assert verdicts.of_interval(goal, near, 2048, 0.95, 0.002) == (Verdict.UNDECIDED, np.inf)
     assert verdicts.of_interval(goal, far, 2048, 0.95, 0.002).price == 8192.0
     case = SimpleNamespace(goals=[], kept=[goal])

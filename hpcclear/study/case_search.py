@@ -360,12 +360,12 @@ class CaseSearch:
 
 def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -> None:
     """Twice the simulations of designs of several cases, and first ones of new designs."""
-    where = [(one.designs, row) for one, rows in asked for row in rows]
-    chosen = [one.choices[row] for one, row in where]
-    made = [one.made[row] for one, row in where]
-    for length in sorted({one.shape[2] for one in made}):
-        rows = [k for k, one in enumerate(made) if one.shape[2] == length]
-        more = length or FIRST
-        truth.lengthen(run, chosen, made, rows, "search", "search", more)
-    for (one, row), values in zip(where, made, strict=True):
-        one.made[row] = values
+    by_length: dict[int, list[tuple[Simulated, int]]] = {}
+    for one, rows in asked:
+        for row in rows:
+            by_length.setdefault(one.designs.made[row].shape[2], []).append((one.designs, row))
+    for length, where in sorted(by_length.items()):
+        chosen = [designs.choices[row] for designs, row in where]
+        fresh = truth.drawn(run, chosen, "search", length or FIRST, length)
+        for (designs, row), values in zip(where, fresh, strict=True):
+            designs.made[row] = np.concatenate([designs.made[row], values], axis=2)

@@ -12,7 +12,7 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.report.merit import SPAN
 from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
-from hpcclear.statistics.random.replicates import limits, moments, spread
+from hpcclear.statistics.random.replicates import Limited, limits, moments, spread
 from hpcclear.statistics.search import improvement
 from hpcclear.study import goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -168,7 +168,7 @@ def reaches(settings: Verification, values: Array) -> tuple[float, float]:
     return mean, deviation
 
 
-def goals_of(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
+def goals_of(run: StudyRun, choice: Choice, values: Array) -> list[Limited]:
     """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)

@@ -3,7 +3,7 @@
 Nothing is simulated for it: the samples that verify a design are fitted.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from hpcclear.base.arrays import Array
 from hpcclear.report.scatter import to_tighten
 from hpcclear.results import dataset
 from hpcclear.scene.choices import input_entry
-from hpcclear.scene.points import Points
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.sensitivity.contributions import contributions
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.truth import scattered
 
 _NAMES = ("contribution", "contribution_error", "halved", "halved_error")
 _OF_ALL = ("halved_together", "halved_together_error", "unexplained", "unexplained_error")
@@ -27,18 +27,12 @@ def inputs_of(run: StudyRun) -> list[str]:
     return [row.name for row in run.study.random if row.name in used]
 
 
-def of_designs(
-    run: StudyRun,
-    choices: Sequence[Choice],
-    made: Sequence[Array],
-    drawn: Callable[[Choice, Array], Points],
-) -> Result:
+def of_designs(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
     """Contributions of the random inputs to the scatter of designs.
 
-    From simulations, (2, replicates, values) each, of `hpcclear.study.truth.made`; `drawn`: from a design and its f,
-    (replicates, values), to the points they were taken at. Returns ``contribution``, ``halved`` and their ``_error``, (n,
-    inputs), as `hpcclear.statistics.sensitivity.contributions` has them, and ``group``, 0 of independent inputs; NaN for
-    inputs that do not belong to a design's case; ``halving_cost``, (n, inputs), NaN where it is not known;
+    From simulations, (2, replicates, values) each, of `hpcclear.study.truth.made`. Returns ``contribution``, ``halved`` and
+    their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has them, and ``group``, 0 of independent
+    inputs; NaN for inputs that do not belong to a design's case; ``halving_cost``, (n, inputs), NaN where it is not known;
     ``halved_together`` of the inputs to tighten first, ``unexplained``, and their ``_error``, (n,).
     """
     names = inputs_of(run)
@@ -47,9 +41,10 @@ def of_designs(
     result |= {name: np.full(len(choices), np.nan) for name in _OF_ALL}
     result["halving_cost"] = _prices(run, choices, names)
     for row, (choice, one) in enumerate(zip(choices, made, strict=True)):
-        f = one[0]
+        f, plain = one[0], run.study.verification.draws is not None
         random = run.study.case(choice.case).random
-        points = drawn(choice, f)
+        length, start = (f.size, None) if plain else (f.shape[1], 0)
+        points = scattered(run, choice, length, first=start)
         own = [points.names.index(name) for name in random]
         count = f.size // REPLICATES  # plain draws in as many parts
         values = points.values[: REPLICATES * count, own].reshape(REPLICATES, count, len(own))

@@ -1,7 +1,6 @@
 """Objectives and constraints of a case: values with confidence intervals from simulations, or surrogate predictions."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
@@ -13,44 +12,31 @@ from hpcclear.scene.domain import to_physical
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
+from hpcclear.statistics.random.replicates import Limited
 
 SMOOTH = 0.1
 """Standard deviations over which an exceedance is smoothed in the search on the surrogate, so that it has a slope near 0."""
-
 
 SHARE_OF_MOST = 0.02
 """Half-width of a probability, over the largest that is allowed, at which it is known well enough though not decided."""
 
 
-@dataclass(frozen=True)
-class GoalValue:
-    """An objective or constraint of a design by simulation: value, interval, and what each replicate shifts (r,)."""
-
-    value: float
-    lower: float
-    upper: float
-    shifts: Array
-
-
 def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
-) -> GoalValue:
+) -> Limited:
     """An objective or constraint from values of f, (replicates, values), NaN where failed, and the design in SI; or from
     those of all responses, (k, replicates, values)."""
     values = values[goal.place] if values.ndim == 3 else values
     if goal.exact:
         value = float(goal.of_design(design))
-        return GoalValue(value, value, value, np.zeros(len(values)))
+        return Limited(value, np.zeros(len(values)), value, value)
     if goal.statistic == "quantile":
-        found = replicates.quantile(values, goal.order, confidence)
-    elif goal.statistic == "exceedance":
+        return replicates.quantile(values, goal.order, confidence)
+    if goal.statistic == "exceedance":
         assert goal.limit is not None  # by validation
-        found = replicates.exceedance(values, goal.limit, confidence)
-    else:
-        mean, deviation = replicates.moments(values)
-        one = mean if goal.statistic == "mean" else deviation
-        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
-    return GoalValue(found.value, found.lower, found.upper, found.shifts)
+        return replicates.exceedance(values, goal.limit, confidence)
+    one = replicates.moments(values)[goal.statistic != "mean"]
+    return Limited(one.value, one.shifts, *replicates.limits(one, confidence))
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
@@ -67,7 +53,7 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
+def accurate(goal: Goal, one: Limited, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
     """Whether its interval is as narrow as requested, or as a part of that."""
     share, relative = wanted(goal, accuracy)
     share *= part

@@ -20,11 +20,9 @@ from hpcclear.base.verdict import Verdict, together
 from hpcclear.scene.cases import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
-from hpcclear.scene.stages import Verification
 from hpcclear.statistics.random.importance import REPEATS, Density, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, tolerance, verdicts
-from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -220,31 +218,14 @@ def _streams(run: StudyRun, purpose: str, round_: int) -> list[np.random.Generat
 
 
 def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
-    settings = run.study.verification
-    if rate.f.size >= most_draws(settings):
+    settings, first = run.study.verification, LENGTH * REPEATS
+    if rate.f.size >= first * 2 ** int(np.log2(max(settings.most_samples / first, 1.0))):
         return True
     sure = verdicts.level(settings, many, rate.f.size)
-    if (
-        verdicts.of_interval(
-            one.goal, _goal_value(_interval(one, rate, sure)), rate.f.size, sure
-        ).verdict
-        is not Verdict.UNDECIDED
-    ):
+    found = verdicts.of_interval(one.goal, _interval(one, rate, sure), rate.f.size, sure)
+    if found.verdict is not Verdict.UNDECIDED:
         return True
-    return goals.accurate(
-        one.goal, _goal_value(_interval(one, rate, settings.confidence)), run.study.wanted
-    )
-
-
-def most_draws(settings: Verification) -> int:
-    """Draws of all repeats of a design, at most."""
-    return (
-        LENGTH * REPEATS * 2 ** int(np.log2(max(settings.most_samples / (LENGTH * REPEATS), 1.0)))
-    )
-
-
-def _goal_value(one: Limited) -> GoalValue:
-    return GoalValue(one.value, one.lower, one.upper, one.shifts)
+    return goals.accurate(one.goal, _interval(one, rate, settings.confidence), run.study.wanted)
 
 
 def _together(

@@ -26,7 +26,7 @@ from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.pooled import together
 from hpcclear.statistics.random.replicates import Estimate, moments, spread
-from hpcclear.study import contest, goals, truth, verdicts, verification
+from hpcclear.study import contest, contributions, goals, truth, verdicts, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -127,7 +127,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         without |= undone
         made = truth.made(run, designs, made, _left(run, taken), without)
         true = _widened(run, designs, made, truth.results_of(run, designs, made), taken)
-    return true | truth.explained(run, designs, made)
+    return true | contributions.of_designs(run, designs, made)
 
 
 def _undone(
@@ -171,24 +171,15 @@ def _begun(
     run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], most: float
 ) -> list[Array]:
     """The first points of all designs at the stricter tolerance, (k, replicates, values) each."""
-    draws = run.study.verification.draws
+    draws, tight = run.study.verification.draws, run.of(stricter(run.scene)[0])
     if draws is None:
         length = _first(min(one.shape[2] for one in made), len(designs), most)
-        strict = [truth.nothing(run)] * len(designs)
-        _simulate(run, designs, strict, range(len(designs)), length)
-        return strict
-    count, tight = _of_draws(draws, len(designs), most), run.of(stricter(run.scene)[0])
-    strict = truth.drawn(tight, designs, "pairs", "verification", count)
+        strict = truth.drawn(tight, designs, "pairs", length)
+    else:
+        count = _of_draws(draws, len(designs), most)
+        strict = truth.drawn(tight, designs, "pairs", count, None)
     run.simulations.next = tight.simulations.next
     return strict
-
-
-def _simulate(
-    run: StudyRun, designs: Sequence[Choice], strict: list[Array], rows: Sequence[int], more: int
-) -> None:
-    tight = run.of(stricter(run.scene)[0])
-    truth.lengthen(tight, designs, strict, rows, "pairs", "verification", more)
-    run.simulations.next = tight.simulations.next
 
 
 def _lengthened(
@@ -212,7 +203,9 @@ def _lengthened(
         ]  # fmt: skip
         if not rows or spent + len(rows) * REPLICATES * length > most:
             return taken
-        _simulate(run, designs, strict, rows, length)
+        tight = run.of(stricter(run.scene)[0])
+        truth.lengthen(tight, designs, strict, rows, "pairs", length)
+        run.simulations.next = tight.simulations.next
 
 
 def _hidden(run: StudyRun, choice: Choice, whole: Array, error: Array) -> bool:

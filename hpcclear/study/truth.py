@@ -11,7 +11,7 @@ from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, moments, quantile
-from hpcclear.study import contest, contributions, goals, verdicts
+from hpcclear.study import contest, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -25,38 +25,23 @@ QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
 
 
-def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
-    """Independent samples of a design in all study variables.
-
-    Every design of a case meets the same scatter, so that differences between designs are not
-    noise.
-    """
-    return _of_design(run, choice, count, purpose, 0, None)
-
-
 def scattered(
-    run: StudyRun, choice: Choice, count: int, purpose: str = "verification", first: int = 0
+    run: StudyRun, choice: Choice, count: int, stage: str = "verification", first: int | None = 0
 ) -> Points:
-    """The points from `first` on of all replicates of a design, `count` of each, one replicate after the other."""
-    return _of_design(run, choice, count, purpose, first, range(REPLICATES))
+    """Points of a design in all study variables: from `first` on of all replicates, `count` of each, one replicate after the
+    other; so many independent samples where that is None.
 
-
-def _of_design(
-    run: StudyRun,
-    choice: Choice,
-    count: int,
-    purpose: str,
-    first: int,
-    replicate: Sequence[int] | None,
-) -> Points:
+    Every design of a case meets the same scatter in a stage, so that differences between designs are not noise; pairs meet
+    that of the verification.
+    """
     points = monte_carlo(
         run.scene,
         count,
         random=run.study.case(choice.case).random,
         design=dict(choice.design),
-        purpose=purpose,
-        first=first,
-        replicate=replicate,
+        purpose="verification" if stage == "pairs" else stage,
+        first=first or 0,
+        replicate=None if first is None else range(REPLICATES),
     )
     return run.simulations.filled(points.names, points.values)
 
@@ -64,7 +49,7 @@ def _of_design(
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
     """The first points of each replicate of designs, (k, replicates, values) each as `made` returns them."""
     length = min(first_length(run.study.verification), search_length(run.study), LOOK)
-    return looked_at(run, choices, "verification", "verification", length)
+    return drawn(run, choices, "verification", length)
 
 
 def made(
@@ -81,36 +66,16 @@ def made(
     of each design) requires, and others are simulated as long as choosing it may lose more than `LOST`; as if those `without`
     which it has to go were not there. Raises InputError if all simulations fail.
     """
-    settings, stage = run.study.verification, "verification"
+    settings = run.study.verification
     if settings.draws is not None:
-        return drawn(run, choices, stage, stage, settings.draws)
+        return drawn(run, choices, "verification", settings.draws, None)
     found = list(before) or begun(run, choices)
     wanted = wanted or [run.study.wanted] * len(choices)
     while rows := contest.worth_more(run, choices, found, wanted, without):
         length = min(found[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
         rows = [k for k in rows if found[k].shape[2] == length]
-        lengthen(run, choices, found, rows, stage, stage, length)
+        lengthen(run, choices, found, rows, "verification", length)
     return found
-
-
-def drawn(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, count: int
-) -> list[Array]:
-    """f of so many independent draws of designs, (2, draws, 1) each."""
-    return _values(run, choices, stage, purpose, count, None)
-
-
-def explained(
-    run: StudyRun, choices: Sequence[Choice], made: Sequence[Array], purpose: str = "verification"
-) -> Result:
-    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from f of each, (rows, n) or (n,)."""
-
-    def drawn(choice: Choice, f: Array) -> Points:
-        if run.study.verification.draws is not None:
-            return samples_of(run, choice, f.size, purpose)
-        return scattered(run, choice, f.shape[1], purpose)
-
-    return contributions.of_designs(run, choices, made, drawn)
 
 
 def scrambled_length(simulations: int) -> int:
@@ -142,48 +107,27 @@ def expected(study: Study) -> int:
     return int(np.clip(needed, first_length(settings) * REPLICATES, settings.most_samples))
 
 
-def looked_at(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int
-) -> list[Array]:
-    """f of designs by so many points of each scrambled Sobol sequence, (k, replicates, values) each."""
-    made = [nothing(run)] * len(choices)
-    lengthen(run, choices, made, range(len(choices)), stage, purpose, length)
-    return made
-
-
 def lengthen(
     run: StudyRun,
     choices: Sequence[Choice],
     made: list[Array],
     rows: Sequence[int],
     stage: str,
-    purpose: str,
     length: int,
 ) -> None:
-    """So many points more of each replicate of some designs that are equally long; `made` as `made` returns it, shape
-    (2, replicates, values) each."""
-    first = made[rows[0]].shape[2]
-    fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
+    """So many points more of each replicate of some designs that are equally long; `made` as `made` returns it."""
+    fresh = drawn(run, [choices[k] for k in rows], stage, length, made[rows[0]].shape[2])
     for k, one in zip(rows, fresh, strict=True):
         made[k] = np.concatenate([made[k], one], axis=2)
 
 
-def _values(
-    run: StudyRun,
-    choices: Sequence[Choice],
-    stage: str,
-    purpose: str,
-    count: int,
-    first: int | None,
+def drawn(
+    run: StudyRun, choices: Sequence[Choice], stage: str, count: int, first: int | None = 0
 ) -> list[Array]:
-    """f, whether beyond Hertz's range, and further responses, (k, replicates, values) each: `count` draws, or points from
-    `first` on of each replicate."""
-    if first is None:
-        batches = [samples_of(run, choice, count, purpose) for choice in choices]
-        shape = count, 1
-    else:
-        batches = [scattered(run, choice, count, purpose, first) for choice in choices]
-        shape = REPLICATES, count
+    """f, whether beyond Hertz's range, and further responses of designs, (k, replicates, values) each: at `count` points from
+    `first` on of each replicate; of as many independent draws, each a replicate, where that is None."""
+    batches = [scattered(run, choice, count, stage, first) for choice in choices]
+    shape = (count, 1) if first is None else (REPLICATES, count)
     values = np.concatenate([batch.values for batch in batches])
     points = Points(batches[0].names, values, batches[0].paths)
     records, responses = run.simulations.judged(points, stage)
@@ -192,7 +136,7 @@ def _values(
     return [part.reshape(len(found), *shape) for part in np.split(found, len(choices), axis=1)]
 
 
-def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
+def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate]:
     """Mean, standard deviation, percentile, objectives and constraints of a design, from its simulations (k, replicates, n)."""
     percentile = quantile(values[0], QUANTILE, run.study.verification.confidence)
     return [*moments(values[0]), percentile, *contest.goals_of(run, choice, values)]
@@ -218,6 +162,10 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
+
+    def padded(found: list[float], count: int) -> list[float]:
+        return found + [np.nan] * (count - len(found))
+
     for choice, whole, many in zip(choices, made, verdicts.rivals(choices), strict=True):
         values, beyond = whole[:2]
         row: dict[str, object] = {
@@ -229,25 +177,21 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         for name, one, reach in zip(("mean", "deviation"), moments(values), reaches, strict=True):
             row |= {name: one.value, f"{name}_error": one.error, f"{name}_reach": reach}
             row[f"{name}_shifts"] = one.shifts
-        found = quantile(values, QUANTILE, settings.confidence)
-        row |= {"percentile": found.value, "percentile_lower": found.lower}
-        row["percentile_upper"] = found.upper
-        estimates = contest.goals_of(run, choice, whole)
-        missing = [np.nan] * (most - len(estimates))
-        row["goal"] = [one.value for one in estimates] + missing
-        row["goal_lower"] = [one.lower for one in estimates] + missing
-        row["goal_upper"] = [one.upper for one in estimates] + missing
-        unknown = np.full(len(values), np.nan)
-        row["goal_shifts"] = [one.shifts for one in estimates] + [unknown] * len(missing)
-        sure = verdicts.level(settings, many, values.size)
         kept = run.study.case(choice.case).kept
+        sure = verdicts.level(settings, many, values.size)
+        percentile = quantile(values, QUANTILE, settings.confidence)
+        estimates = contest.goals_of(run, choice, whole)
         certain = [goals.goal_value(goal, whole, choice.design, sure) for goal in kept]
-        missing = [np.nan] * (held - len(kept))
-        row["taken"] = [0.0] * len(certain) + missing
-        row["counted"] = [float(values.size)] * len(certain) + missing
-        row["beyond"] = [goals.beyond(goal, whole) for goal in kept] + missing
-        row["sure_lower"] = [one.lower for one in certain] + missing
-        row["sure_upper"] = [one.upper for one in certain] + missing
+        row |= {"percentile": percentile.value, "goal": padded([x.value for x in estimates], most)}
+        for end in ("lower", "upper"):
+            row[f"percentile_{end}"] = getattr(percentile, end)
+            row[f"goal_{end}"] = padded([getattr(one, end) for one in estimates], most)
+            row[f"sure_{end}"] = padded([getattr(one, end) for one in certain], held)
+        unknown = [np.full(len(values), np.nan)] * (most - len(estimates))
+        row["goal_shifts"] = [one.shifts for one in estimates] + unknown
+        row["taken"] = padded([0.0] * len(kept), held)
+        row["counted"] = padded([float(values.size)] * len(kept), held)
+        row["beyond"] = padded([goals.beyond(goal, whole) for goal in kept], held)
         rows.append(row)
     return verdicts.decided(
         run, choices, {name: np.array([row[name] for row in rows]) for name in rows[0]}

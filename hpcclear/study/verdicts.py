@@ -19,8 +19,8 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.scene.study import Study
+from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals
-from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -68,17 +68,14 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
             sure = level(run.study.verification, many[row], simulations)
             value = true["goal"][row, len(case.goals) + k]
             interval = true["sure_lower"][row, k], true["sure_upper"][row, k]
-            one, taken = GoalValue(value, *interval, _NOTHING), true["taken"][row, k]
+            one, taken = Limited(value, np.empty(0), *interval), true["taken"][row, k]
             found = of_interval(goal, one, simulations, sure, taken)
             true["verdict"][row, k], true["price"][row, k] = found
     return true
 
 
-_NOTHING = np.empty(0)
-
-
 def of_interval(
-    goal: Constraint, one: GoalValue, simulations: int, confidence: float, taken: float = 0.0
+    goal: Constraint, one: Limited, simulations: int, confidence: float, taken: float = 0.0
 ) -> Decision:
     """How a design stands to a constraint, from an interval at a two-sided confidence by so many simulations, and its price.
     `taken` is the part of the half-width that more simulations leave."""
@@ -90,7 +87,7 @@ def of_interval(
 
 
 def _price(
-    goal: Constraint, one: GoalValue, simulations: int, confidence: float, taken: float
+    goal: Constraint, one: Limited, simulations: int, confidence: float, taken: float
 ) -> float:
     """Simulations after which an interval would just exclude the threshold: its width falls as the root of their number, but
     for what the tolerance takes."""

@@ -27,7 +27,7 @@ from hpcclear.statistics.random.replicates import moments
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper.printed import own_names, printed_designs, printed_moments
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.truth import samples_of, scattered, scrambled_length
+from hpcclear.study.truth import scattered, scrambled_length
 
 STAGE = "readings"
 OTHER_RESTITUTION = 0.46
@@ -136,7 +136,7 @@ def _over_steps(
     """The same, a response each."""
     variants: list[dict[str, object]] = []
     for one in designs:
-        for batch in (samples_of(run, one, STEP_SAMPLES), _smallest(run, one)):
+        for batch in (scattered(run, one, STEP_SAMPLES, first=None), _smallest(run, one)):
             for row in batch.values:
                 variants.append({"output.instants_per_revolution": 0})
                 for name, value in zip(batch.names, row, strict=True):
