@@ -57,8 +57,7 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     """Wall seconds of a batch on the first `number` ranks, making of the workers left out."""
     region = region_of(scene, case)
     rng = generator(scene.required_study.seed, "accuracy", "parallel")
-    unit = rng.random((samples, len(region.names)))
-    coordinates = region.lower + unit * (region.upper - region.lower)
+    coordinates = region.at(rng.random((samples, len(region.names))))
     points = points_at(scene, region.names, coordinates)
     stage = _stage(number, samples)
     payload = simulate.payload_of(scene, points)

@@ -32,8 +32,8 @@ def region_of(scene: Scene, case: str) -> Box:
 def designs_of(scene: Scene, case: str, profile: Profile, rng: np.random.Generator) -> list[Array]:
     """Designs of every training sample, then of the test, in sampling coordinates, shape (size, d) each."""
     region = region_of(scene, case)
-    unit = [unit_lhs(size, len(region.names), rng) for size in (*profile.training, profile.tests)]
-    return [region.lower + u * (region.upper - region.lower) for u in unit]
+    sizes = *profile.training, profile.tests
+    return [region.at(unit_lhs(size, len(region.names), rng)) for size in sizes]
 
 
 def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
@@ -58,7 +58,7 @@ def measure(
     region, rng = region_of(scene, case), _generator(scene)
     coordinates = designs_of(scene, case, profile, rng)
     parts = np.split(values, np.cumsum([len(one) for one in coordinates])[:-1])
-    bounds = np.column_stack([region.lower, region.upper])
+    bounds = region.bounds
     names = [coordinate(scene.required_study.variable(name)) for name in region.names]
     methods: dict[str, Method] = {"Kriging": KrigingMethod()}
     asked = method_of(scene)

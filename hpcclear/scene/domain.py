@@ -30,6 +30,15 @@ class Box:
     lower: Array
     upper: Array
 
+    @property
+    def bounds(self) -> Array:
+        """Both, shape ``(d, 2)``."""
+        return np.column_stack([self.lower, self.upper])
+
+    def at(self, unit: Array) -> Array:
+        """Points ``(n, d)`` of the unit cube in these bounds."""
+        return self.lower + unit * (self.upper - self.lower)
+
 
 def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
     """Bounds of some study variables, in the order of `names`; of all of them by default.

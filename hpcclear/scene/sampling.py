@@ -49,7 +49,7 @@ def latin_hypercube(
     count = _count(study, samples)
     region = box(scene, names)
     unit = unit_lhs(count, len(region.names), generator(study.seed, f"lhs {purpose}"))
-    coordinates = region.lower + unit * (region.upper - region.lower)
+    coordinates = region.at(unit)
     for column, name in enumerate(region.names):
         if (options := study.variable(name).options) is not None:
             coordinates[:, column] = Empirical(options)(unit[:, column])

@@ -73,7 +73,7 @@ class CaseSearch:
         if case.plain:  # mean + 2 standard deviations are what a design is recommended by
             directions = np.vstack([[1.0, SPAN], directions])
         self._space = Space(
-            np.column_stack([region.lower, region.upper]),
+            region.bounds,
             directions,
             goals.exact_in(run.scene, case),
             self._margins(AIM),
@@ -88,7 +88,7 @@ class CaseSearch:
         self._idle, self._hope = 0, 0.0
         self._least = AREA if len(case.goals) < 3 else AREA / 5.0
         unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
-        wide = choices(run, case.name, region.lower + unit * (region.upper - region.lower))
+        wide = choices(run, case.name, region.at(unit))
         self.designs = Simulated(run, case, guesses, distinct([*start, *wide]))
         self._begun = len(self.designs)
         self._failures = Failures(run, case, self._rng)
@@ -359,13 +359,12 @@ class CaseSearch:
 
 
 def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -> None:
-    """Twice the simulations of designs of several cases, and first ones of new designs."""
-    by_length: dict[int, list[tuple[Simulated, int]]] = {}
-    for one, rows in asked:
-        for row in rows:
-            by_length.setdefault(one.designs.made[row].shape[2], []).append((one.designs, row))
-    for length, where in sorted(by_length.items()):
-        chosen = [designs.choices[row] for designs, row in where]
+    """Twice the simulations of designs of several cases, and first ones of new designs; twice again where these then are as
+    many as another of the designs has."""
+    where = [(one.designs, row) for one, rows in asked for row in rows]
+    for length in sorted({one.made[row].shape[2] for one, row in where}):
+        alike = [(one, row) for one, row in where if one.made[row].shape[2] == length]
+        chosen = [one.choices[row] for one, row in alike]
         fresh = truth.drawn(run, chosen, "search", length or FIRST, length)
-        for (designs, row), values in zip(where, fresh, strict=True):
-            designs.made[row] = np.concatenate([designs.made[row], values], axis=2)
+        for (one, row), values in zip(alike, fresh, strict=True):
+            one.made[row] = np.concatenate([one.made[row], values], axis=2)

@@ -74,16 +74,16 @@ class _Rehearsal(Simulations):
         super().__init__(run.scene, alone(), cast(Checkpoint, None), "quiet")
         names, region = run.study.models[-1], surrogates.domain(run, run.study.models[-1])
         rng, self._names = run.rng("pilot"), names
-        unit = unit_lhs(count, len(names), rng)
-        places = region.lower + unit * (region.upper - region.lower)
+        places = region.at(unit_lhs(count, len(names), rng))
         points = run.simulations.designs(names, snapped(run.study, names, places, model=True))
         records, responses = run.simulations.judged(points, "pilot")
         self._made, self._like = (points.values, responses), records[:1]
         self._like["status"] = Status.OK
-        bounds = np.column_stack([region.lower, region.upper])
         method = surrogates.method_of(run.scene)
         labels = [surrogates.coordinate(run.study.variable(name)) for name in names]
-        self._models = [method.fit(places, one, bounds, rng=rng, names=labels) for one in responses]
+        self._models = [
+            method.fit(places, one, region.bounds, rng=rng, names=labels) for one in responses
+        ]
         self._sizes = self._unexplained(run, designs)
         self._waves = rng.standard_normal((len(names), WAVES)) / SHORT
         self._phases = rng.uniform(0.0, 2.0 * np.pi, WAVES)
@@ -105,8 +105,7 @@ class _Rehearsal(Simulations):
         """Standard deviation of what surrogates leave of each response: of it replicates of so many designs scatter."""
         case, squares = run.study.cases[0].name, []
         region = box(run.scene, run.study.design_variables(case))
-        unit = unit_lhs(count, len(region.lower), run.rng("pilot", case))
-        places = region.lower + unit * (region.upper - region.lower)
+        places = region.at(unit_lhs(count, len(region.lower), run.rng("pilot", case)))
         for choice in optimisation.choices(run, case, places):
             points = truth.scattered(run, choice, LENGTH, "pilot")
             _, found = run.simulations.judged(points, "pilot")
@@ -120,12 +119,8 @@ class _Rehearsal(Simulations):
         leaf, places = self._models[0], self._places(points)
         phases = (places - leaf.lower) / (leaf.upper - leaf.lower) @ self._waves + self._phases
         waves = np.sqrt(2.0 / WAVES) * np.cos(phases).sum(axis=1)
-        found = np.array(
-            [
-                one.predict(places) + size * waves
-                for one, size in zip(self._models, self._sizes, strict=True)
-            ]
-        )
+        models = zip(self._models, self._sizes, strict=True)
+        found = np.array([one.predict(places) + size * waves for one, size in models])
         records = np.repeat(self._like, len(points))
         records["objective"] = found[0]
         self.counts[stage] += len(points)

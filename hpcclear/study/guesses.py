@@ -53,16 +53,12 @@ class Guesses:
         """What objectives, then constraints, come to by the surrogate, of designs (n, d) to (n,) each."""
         if not self:
             return []
-        count = len(region.names)
-        places = region.lower + unit_lhs(TRENDED * count, count, rng) * (
-            region.upper - region.lower
-        )
+        count, bounds = len(region.names), region.bounds
+        places = region.at(unit_lhs(TRENDED * count, count, rng))
         made = choices(self._run, self._case.name, places)
         columns = np.array([self._columns(one) for one in made]).T
-        designs = to_coordinates(
-            self._run.scene, region.names, np.array([list(one.design.values()) for one in made])
-        )
-        bounds = np.column_stack([region.lower, region.upper])
+        values = np.array([list(one.design.values()) for one in made])
+        designs = to_coordinates(self._run.scene, region.names, values)
         designs = np.clip(designs, *bounds.T)  # round-off at the border
         return [
             fit_kriging(designs, one, bounds, rng=rng, restarts=0, kernel=MATERN).predict

@@ -70,7 +70,7 @@ def _begun(
     """The search of a study at its start, what it was made for, and its name."""
     settings = scene.required_study.swarm
     task = SearchTask(
-        bounds=np.column_stack([region.lower, region.upper]),
+        bounds=region.bounds,
         objectives=objectives,
         rng=rng,
         iterations=settings.iterations,

@@ -34,31 +34,18 @@ them, and for all that is not mean and standard deviation."""
 
 @dataclass(frozen=True)
 class SwarmProblem:
-    """What the swarm minimises in one case.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Design variables Z.
-    region : Box
-        Their bounds in sampling coordinates.
-    objective : RobustObjective
-        Mean and standard deviation of designs in SI.
-    scene : Scene
-    case : Case
-    draws : callable
-        Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides.
-    further : tuple of RobustObjective
-        The same of `Study.further`, responses besides f that cases require.
-    """
+    """What the swarm minimises in one case: over the design variables `names`, whose bounds are `region`."""
 
     names: tuple[str, ...]
     region: Box
     objective: RobustObjective
+    """Mean and standard deviation of designs in SI."""
     scene: Scene
     case: Case
     draws: Drawn
+    """Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides."""
     further: tuple[RobustObjective, ...] = ()
+    """As `objective`, of `Study.further`, responses besides f that cases require."""
 
     def physical(self, coordinates: Array) -> Array:
         """The nearest designs that exist, in SI, shape (n, d)."""
@@ -74,77 +61,53 @@ class SwarmProblem:
             return self.objective(designs)
         draws = self.draws(designs)
         each = [one.sampled(designs, draws) for one in (self.objective, *self.further)]
-        named = dict(zip(self.names, designs.T, strict=True))
+        named, broken = dict(zip(self.names, designs.T, strict=True)), []
 
         def of(goal: Goal) -> Array:
             return each[max(goal.place - 1, 0)]
 
         found = np.column_stack([guessed(goal, of(goal), named) for goal in self.case.goals])
-        if not self.case.kept:
-            return found
-        broken = [
-            shortfall(one, one.most, of(one))
-            if one.statistic == "exceedance"
-            else excess([one], guessed(one, of(one), named)[:, None])
-            for one in self.case.kept
-        ]
-        return found, np.maximum(np.max(broken, axis=0), 0.0)
+        for one in self.case.kept:
+            if one.statistic == "exceedance":
+                broken.append(shortfall(one, one.most, of(one)))
+            else:
+                broken.append(excess([one], guessed(one, of(one), named)[:, None]))
+        return (found, np.maximum(np.max(broken, axis=0), 0.0)) if broken else found
 
     def moments(self, designs: Array) -> Array:
         """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
         found = np.full((len(designs), 2), np.nan)
         for row, design in enumerate(designs):
-            try:
+            with contextlib.suppress(InputError):  # random inputs leave the surrogate's domain
                 found[row] = self.objective(design[None])[0]
-            except InputError:  # the design's random inputs leave the surrogate's domain
-                continue
         return found
 
 
-@dataclass(frozen=True)
 class _Averages:
-    """How the surrogates of one case are averaged over its random inputs."""
+    """How the surrogates of one case are averaged over its random inputs.
 
-    scene: Scene
-    case: str
+    `moving`: whether a distribution depends on the design; `correlated`: whether inputs vary together.
+    """
 
-    @property
-    def study(self) -> Study:
-        return self.scene.required_study
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.study.design_variables(self.case)
-
-    @property
-    def rows(self) -> list[RandomInput]:
-        return [self.study.random_input(name) for name in self.study.case(self.case).random]
-
-    @property
-    def moving(self) -> bool:
-        """Whether a distribution depends on the design."""
-        return any(self.study.moves(row) for row in self.rows)
-
-    @property
-    def correlated(self) -> bool:
+    def __init__(self, scene: Scene, case: str) -> None:
+        self.scene, self.study, self.case = scene, scene.required_study, case
+        self.names, self.random = self.study.design_variables(case), self.study.case(case).random
+        self.rows = [self.study.random_input(name) for name in self.random]
+        self.moving = any(self.study.moves(row) for row in self.rows)
         together = self.study.correlation
-        random = {row.name for row in self.rows}
-        return together is not None and len(set(together.inputs) & random) > 1
+        inputs = () if together is None else together.inputs
+        self.correlated = len(set(inputs) & set(self.random)) > 1
 
     def objective(self, model: Piecewise) -> RobustObjective:
         """Mean and standard deviation of f, by an exact rule where there is one."""
-        rng = generator(self.study.seed, "moments", self.case)
-        probes = self.probes(rng)
-        statistics, by_chance = (
-            self.study.swarm.statistics,
-            (self.study.swarm.monte_carlo_samples, rng),
-        )
-        if self.moving or self.correlated or (statistics == "quadrature" and not model.separable):
+        rng, settings = generator(self.study.seed, "moments", self.case), self.study.swarm
+        probes, exact = self.probes(rng), settings.statistics == "quadrature"
+        if self.moving or self.correlated or (exact and not model.separable):
             return self.averaged(model, probes, self.drawn(self.chances(rng)))
-        if statistics != "monte-carlo":
+        if settings.statistics != "monte-carlo":
             with contextlib.suppress(InputError):  # length scales too short for a quadrature rule
                 return self.averaged(model, probes)
-        return self.averaged(model, probes, by_chance)
+        return self.averaged(model, probes, (settings.monte_carlo_samples, rng))
 
     def averaged(
         self,
@@ -152,23 +115,14 @@ class _Averages:
         probes: Array,
         draws: tuple[int, np.random.Generator] | Drawn | None = None,
     ) -> RobustObjective:
-        inputs = [
-            RandomVariable(
-                row.name,
-                _inner(self.study, row) if self.moving else row.law,
-                about_design=not row.absolute,
-            )
-            for row in self.rows
-        ]
+        laws = [_inner(self.study, row) if self.moving else row.law for row in self.rows]
+        each = zip(self.rows, laws, strict=True)
+        inputs = [RandomVariable(row.name, law, not row.absolute) for row, law in each]
         joint = self.joint if self.correlated and not self.moving else None
+        variables = [self.study.variable(name) for name in self.study.optimisation]
+        ratios = [_ratio(self.scene, x.paths[0]) for x in variables if x.ratio is not None]
         return RobustObjective(
-            model,
-            self.names,
-            inputs,
-            derived=self.derived(),
-            probes=probes,
-            draws=draws,
-            joint=joint,
+            model, self.names, inputs, derived=ratios, probes=probes, draws=draws, joint=joint
         )
 
     def probes(self, rng: np.random.Generator) -> Array:
@@ -176,13 +130,7 @@ class _Averages:
         region = box(self.scene, self.names)
         corners = list(itertools.product((0.0, 1.0), repeat=len(self.names)))
         unit = np.concatenate([unit_lhs(PROBES, len(self.names), rng), np.array(corners)])
-        places = region.lower + unit * (region.upper - region.lower)
-        return to_physical(self.scene, self.names, places)
-
-    def derived(self) -> list[DerivedInput]:
-        """Ratios that the model knows instead of inertias."""
-        variables = [self.study.variable(name) for name in self.study.optimisation]
-        return [_ratio(self.scene, one.paths[0]) for one in variables if one.ratio is not None]
+        return to_physical(self.scene, self.names, region.at(unit))
 
     def chances(self, rng: np.random.Generator) -> Array:
         """Probabilities of the random inputs, (inputs, s)."""
@@ -190,7 +138,7 @@ class _Averages:
 
     def drawn(self, chances: Array) -> Drawn:
         """Draws at probabilities (inputs, s): the same for all designs, unless distributions depend on them."""
-        random = [row.name for row in self.rows]
+        random = self.random
         if not self.moving:
             found = offsets(self.scene, random, list(chances))
             fixed = {name: one[None] for name, one in found.items()}
@@ -207,8 +155,8 @@ class _Averages:
 
     def joint(self, count: int, rng: np.random.Generator) -> dict[str, Array]:
         """Independent draws of inputs that vary together."""
-        random = [row.name for row in self.rows]
-        return offsets(self.scene, random, list(rng.random((len(random), count)) + 2.0**-54))
+        places = rng.random((len(self.random), count)) + 2.0**-54
+        return offsets(self.scene, self.random, list(places))
 
 
 def problem_of(
@@ -220,13 +168,11 @@ def problem_of(
     that is no product of its inputs: these are averaged over points of a Sobol sequence. A model whose length scales are a
     small part of a random input's range (it has found noise) is averaged by Monte Carlo.
     """
-    averages = _Averages(scene, case)
-    objective = averages.objective(model)
-    points = averages.drawn(averages.chances(generator(scene.required_study.seed, "goals", case)))
-    probes = averages.probes(generator(scene.required_study.seed, "moments", case))
+    averages, study = _Averages(scene, case), scene.required_study
+    objective, region = averages.objective(model), box(scene, averages.names)
+    points = averages.drawn(averages.chances(generator(study.seed, "goals", case)))
+    probes = averages.probes(generator(study.seed, "moments", case))
     further = tuple(averages.averaged(other, probes, points) for other in others)
-    study = scene.required_study
-    region = box(scene, averages.names)
     return SwarmProblem(averages.names, region, objective, scene, study.case(case), points, further)
 
 

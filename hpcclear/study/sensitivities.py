@@ -115,7 +115,9 @@ def _designs(run: StudyRun) -> list[IntervalDesign]:
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(intervals.design_intervals(_bounds(run, names), clearances, rng, laid_out))
+        found.append(
+            intervals.design_intervals(box(run.scene, names).bounds, clearances, rng, laid_out)
+        )
     return found
 
 
@@ -132,11 +134,6 @@ def _layouts(study: Study) -> list[IntervalSettings]:
         made = partial(IntervalSettings, steps=settings.rounds, shrink=settings.shrink)
         found.append(made(**sizes, chosen=chosen))
     return found
-
-
-def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
-    region = box(run.scene, names)
-    return np.column_stack([region.lower, region.upper])
 
 
 def _columns(run: StudyRun, names: Sequence[str]) -> list[int]:
@@ -158,7 +155,7 @@ def _first_order(run: StudyRun, made: Sequence[Sampled]) -> Result:
         history = intervals.analyse_intervals(design, values)
         found = convergence_intervals(history)
         slope, uncertainty = best_estimates(history, found)
-        at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
+        at, span = _columns(run, names), np.ptp(box(run.scene, names).bounds, axis=1)
         result["sensitivity"][k][..., at] = history.sensitivity * span
         result["standard_error"][k][..., at] = history.standard_error * span
         for name in ("r2", "rmae", "leave_one_out_r2"):
@@ -295,8 +292,8 @@ def _sobol_points(run: StudyRun) -> Array:
     rows = _sobol_rows(run.study)
     if rows == 0:
         return np.empty((0, len(run.study.names)))
-    bounds = _bounds(run, run.study.names)
     names = run.study.names
+    bounds = box(run.scene, names).bounds
     points = snapped(run.study, names, sobol_design(bounds, rows, run.rng("sobol")))
     near = points[: _beside(run.study)]
     moved = run.rng("sobol noise").uniform(-1.0, 1.0, near.shape)

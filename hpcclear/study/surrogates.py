@@ -67,7 +67,7 @@ def fit_all(run: StudyRun) -> Result:
             max_depth=more if settings.cuts is None else settings.cuts,
         )
         model = fit_subintervals(
-            partial(_simulated, run, names), np.column_stack([region.lower, region.upper]), wanted,
+            partial(_simulated, run, names), region.bounds, wanted,
             method=method, rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
             snap=partial(snapped, run.study, names, model=True),
