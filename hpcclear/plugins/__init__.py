@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 from hpcclear.base.objectives import LEVEL, OURS, Objective, level_of
 from hpcclear.plugins.registry import Registry
-from hpcclear.plugins.sources import raised, run_source, trusting, using
+from hpcclear.plugins.sources import run_source, trusting, using
 
 __all__ = [
-    "CONTACT_LAWS", "DISTRIBUTIONS", "FRICTION_LAWS", "KINDS", "OBJECTIVES", "SEARCHES", "SURROGATES", "Registry", "raised",
+    "CONTACT_LAWS", "DISTRIBUTIONS", "FRICTION_LAWS", "KINDS", "OBJECTIVES", "SEARCHES", "SURROGATES", "Registry",
     "run_source", "trusting", "using",
 ]  # fmt: skip
 

@@ -101,11 +101,17 @@ def run_source(module: str, text: str) -> ModuleType:
     return made
 
 
-def raised(key: str, name: str, what: str, error: Exception) -> InputError:
-    """Return the error of an entry `key` whose plug-in `name` raised in use, with the line it came from."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
-    return InputError(key, name, reason, "Correct it, or leave the entry out")
+@contextlib.contextmanager
+def in_use(key: str, name: str, what: str) -> Iterator[None]:
+    """Raise what the plug-in `name` of an entry `key` raises in use as an InputError, with the line it came from."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
+        raise InputError(key, name, reason, "Correct it, or leave the entry out") from error
 
 
 def _said(error: BaseException, path: str) -> str:

@@ -54,12 +54,7 @@ threshold."""
 
 
 class CaseSearch:
-    """The search of one case: it asks for simulations of designs, which it has in their order.
-
-    Attributes
-    ----------
-    designs : Simulated
-    """
+    """The search of one case: it asks for simulations of `designs`, which it has in their order."""
 
     def __init__(
         self, run: StudyRun, case: Case, start: Sequence[Choice], models: Sequence[Piecewise]
@@ -67,18 +62,18 @@ class CaseSearch:
         self._run, self._case, settings = run, case, run.study.verification
         self._size = truth.search_length(run.study)
         self._names = run.study.design_variables(case.name)
-        region, self._rng = box(run.scene, self._names), run.rng("search", case.name)
+        self._region, self._rng = box(run.scene, self._names), run.rng("search", case.name)
         guesses = Guesses(run, case, models, self._size)
         directions = np.eye(len(case.goals))
         if case.plain:  # mean + 2 standard deviations are what a design is recommended by
             directions = np.vstack([[1.0, SPAN], directions])
         self._space = Space(
-            region.bounds,
+            self._region.bounds,
             directions,
             goals.exact_in(run.scene, case),
             self._margins(AIM),
             partial(snapped, run.study, self._names),
-            guesses.trends(region, self._rng),
+            guesses.trends(self._region, self._rng),
         )
         others = [*range(1, len(directions)), None] if len(case.goals) > 1 else []
         turns = [part for one in others for part in (0, one)] or [0]
@@ -88,7 +83,7 @@ class CaseSearch:
         self._idle, self._hope = 0, 0.0
         self._least = AREA if len(case.goals) < 3 else AREA / 5.0
         unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
-        wide = choices(run, case.name, region.at(unit))
+        wide = choices(run, case.name, self._region.at(unit))
         self.designs = Simulated(run, case, guesses, distinct([*start, *wide]))
         self._begun = len(self.designs)
         self._failures = Failures(run, case, self._rng)
@@ -107,9 +102,8 @@ class CaseSearch:
         try:
             beliefs = self._beliefs()
         except InputError:  # too few designs that did not fail for a model
-            region = self._space.bounds
-            unit = unit_lhs(count, len(region), self._rng)
-            return self.designs.add(region[:, 0] + unit * np.diff(region, axis=1)[:, 0])
+            unit = unit_lhs(count, len(self._names), self._rng)
+            return self.designs.add(self._region.at(unit))
         rows, left = self._leaders(beliefs), list[tuple[float, Array]]()
         for _ in range(count):
             if (len(self.designs) - self._begun) % improvement.EXPLORED == improvement.EXPLORED - 1:
@@ -197,9 +191,8 @@ class CaseSearch:
     def _accuracy(self, beliefs: Beliefs, direction: Array) -> float:
         """The accuracy requested in a direction, at the best design that is known."""
         known = beliefs.believed[beliefs.finite]
-        return contest.size_of(
-            self._run, self._case, direction, known[(known @ direction).argmin()]
-        )
+        best = known[(known @ direction).argmin()]
+        return contest.size_of(self._run, self._case, direction, best)
 
     # -- what is known -------------------------------------------------------------------------------
 
@@ -227,9 +220,8 @@ class CaseSearch:
         excess = self._known().excess[:, columns].max(axis=1)
         known = np.flatnonzero(np.isfinite(excess)).tolist()
         if known and not self._failures.densities:
-            self._failures.prepare(
-                self.designs.choices[min(known, key=lambda row: abs(excess[row]))]
-            )
+            nearest = min(known, key=lambda row: abs(excess[row]))
+            self._failures.prepare(self.designs.choices[nearest])
         near = {row for row in known if abs(excess[row]) < CLOSE} | self._near
         again = sorted(near & self._again & set(self._failures.drawn))
         self._failures.draw(self.designs.choices, sorted(near - set(self._failures.drawn)), FEW)
@@ -245,8 +237,7 @@ class CaseSearch:
             except InputError:  # too few designs that did not fail for a model
                 return
             point = improvement.expected(beliefs, self._space.directions[0])
-            width = np.ptp(self._space.bounds, axis=1)
-            apart = (abs(beliefs.known.designs - point) / width).max(axis=1)
+            apart = self._space.apart(beliefs.known.designs, point)
             row = int(apart.argmin())
             if apart[row] > NEAR:
                 (row,) = self.designs.add(point[None])
@@ -281,9 +272,8 @@ class CaseSearch:
         kept = np.flatnonzero(beliefs.allowed)
         if not len(kept):
             broken = np.where(beliefs.finite, beliefs.shortfalls(known)[0].max(axis=1), np.inf)
-            return [
-                self.designs.choices[row] for row in np.argsort(broken, kind="stable")[: 1 + HEDGES]
-            ]
+            nearest = np.argsort(broken, kind="stable")[: 1 + HEDGES]
+            return [self.designs.choices[row] for row in nearest]
         means = beliefs.believed[kept]
         rows = [int(kept[(means @ one).argmin()]) for one in self._space.directions]
         designs = self._run.study.verification.designs
@@ -297,8 +287,8 @@ class CaseSearch:
         for row in kept[np.argsort(bold[kept], kind="stable")]:
             if bold[row] > merit[rows[0]]:
                 break
-            apart = abs(known[rows] - known[row]) / np.ptp(self._space.bounds, axis=1)
-            if len(rows) < len(self._space.directions) + HEDGES and apart.max(axis=1).min() > AWAY:
+            apart = self._space.apart(known[rows], known[row])
+            if len(rows) < len(self._space.directions) + HEDGES and apart.min() > AWAY:
                 rows.append(int(row))
         points = [improvement.expected(beliefs, one) for one in self._space.directions]
         if all(one.exact for one in self._case.kept):
@@ -308,21 +298,16 @@ class CaseSearch:
                 > WORTH * self._accuracy(beliefs, one)
             ]  # fmt: skip
         else:
-            apart = abs(known - points[0]) / np.ptp(self._space.bounds, axis=1)
-            near = int(np.where(beliefs.finite, apart.max(axis=1), np.inf).argmin())
-            off = np.hypot(
-                beliefs.known.excess_errors[near], beliefs.shortfalls(points[0][None])[1][0]
-            )
-            points += [
-                improvement.expected(beliefs, main, margins)
-                for margins in (
-                    *(self._margins(aim, off) for aim in AIMS),
-                    *(self._margins(AIM) + errors * off for errors in OFF),
-                )
-            ]
+            apart = self._space.apart(known, points[0])
+            near = int(np.where(beliefs.finite, apart, np.inf).argmin())
+            doubt = beliefs.shortfalls(points[0][None])[1][0]
+            off = np.hypot(beliefs.known.excess_errors[near], doubt)
+            margins = [self._margins(aim, off) for aim in AIMS]
+            margins += [self._margins(AIM) + errors * off for errors in OFF]
+            points += [improvement.expected(beliefs, main, one) for one in margins]
         taken = known[rows]
         for point in points:
-            if (abs(taken - point) / np.ptp(self._space.bounds, axis=1)).max(axis=1).min() > NEAR:
+            if self._space.apart(taken, point).min() > NEAR:
                 taken = np.vstack([taken, point])
         fresh = choices(self._run, self._case.name, taken[len(rows) :])
         return distinct([*(self.designs.choices[row] for row in rows), *fresh])

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.plugins.sources import raised
+from hpcclear.plugins.sources import in_use
 from hpcclear.statistics.search.pareto import Archive, Front, best_subset, cut, relative_gain
 from hpcclear.statistics.search.settings import SwarmSettings
 
@@ -28,27 +28,18 @@ Function = Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 
 @dataclass(frozen=True)
 class SearchTask:
-    """What a search is made for.
-
-    Attributes
-    ----------
-    bounds : array, shape (d, 2)
-        Lower and upper bound of each variable.
-    objectives : int
-        m, all minimised; 0 where that is seen at the first evaluation.
-    rng : Generator
-        Its only source of random numbers.
-    iterations : int
-        Evaluations, in units of `particles`.
-    settings : SwarmSettings
-        Those of the swarm, `particles` among them.
-    """
+    """What a search is made for."""
 
     bounds: Array
+    """Lower and upper bound of each variable, shape (d, 2)."""
     objectives: int
+    """All are minimised; 0 where their number is seen at the first evaluation."""
     rng: np.random.Generator
+    """Its only source of random numbers."""
     iterations: int
+    """Evaluations, in units of `particles`."""
     settings: SwarmSettings
+    """Those of the swarm, `particles` among them."""
 
     @property
     def particles(self) -> int:
@@ -73,12 +64,8 @@ class Search(Protocol):
 
 def made(maker: Callable[[SearchTask], Any], name: str, task: SearchTask) -> Search:
     """Return the search with this name. Raises InputError if it does not take the task, or lacks `ask` or `tell`."""
-    try:
+    with in_use(KEY, name, "could not be made of a task"):
         search = maker(task)
-    except InputError:
-        raise
-    except Exception as error:
-        raise raised(KEY, name, "could not be made of a task", error) from error
     missing = [one for one in ("ask", "tell") if not callable(getattr(search, one, None))]
     if missing:
         remedy = "Give it ask() and tell(designs, objectives, constraints)"
@@ -89,21 +76,10 @@ def made(maker: Callable[[SearchTask], Any], name: str, task: SearchTask) -> Sea
 def minimise(
     search: Search, function: Function, task: SearchTask, size: int, name: str = ""
 ) -> Front:
-    """Carry out a search.
+    """Carry out a search that was made for the task; the front has at most `size` points, and `name` is for messages.
 
-    Parameters
-    ----------
-    search : Search
-        Made for the task.
-    size : int
-        Points of the front at most.
-    name : str
-        What the search is called, in messages.
-
-    Raises
-    ------
-    InputError
-        The search failed, requests what is no design within the bounds, or `size` is less than the number of objectives.
+    Raises InputError: the search failed, requests what is no design within the bounds, or `size` is less than the number of
+    objectives.
     """
     met = _Met(task)
     while met.evaluations < task.evaluations:
@@ -112,12 +88,8 @@ def minimise(
             break
         values, broken = _judged(function(designs), len(designs))
         met.add(designs, values, broken)
-        try:
+        with in_use(KEY, name, "failed in tell"):
             search.tell(designs, values, broken)
-        except InputError:
-            raise
-        except Exception as error:
-            raise raised(KEY, name, "failed in tell", error) from error
     return met.front(size)
 
 
@@ -185,13 +157,9 @@ class _Met:
 def _asked(search: Search, name: str, bounds: Array) -> Array:
     """Designs that a search requests, shape (n, d); none where it has come to its end."""
     remedy = f"Let ask() return designs of shape (n, {len(bounds)}) within the bounds of the task"
-    try:
+    with in_use(KEY, name, "failed in ask"):
         found = search.ask()
         designs = np.empty((0, len(bounds))) if found is None else np.array(found, dtype=float)
-    except InputError:
-        raise
-    except Exception as error:
-        raise raised(KEY, name, "failed in ask", error) from error
     if designs.ndim != 2 or designs.shape[1] != len(bounds):
         reason = f"returned an array of shape {designs.shape}, not (n, {len(bounds)})"
         raise InputError(KEY, name, reason, remedy)

@@ -29,55 +29,42 @@ LENGTHS = (0.1, 3.0)
 LIKELY = 0.5
 """Probability of keeping the constraints from which a design may be the best."""
 
-Exact = Callable[[Array], Array]
-Snap = Callable[[Array], Array]
+OfDesigns = Callable[[Array], Array]
+"""A function of designs (n, d)."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """What was evaluated.
-
-    Attributes
-    ----------
-    designs : array, shape (n, d)
-    values, errors : array, shape (n, m)
-        Objectives, all minimised, NaN where they failed; their standard errors.
-    excess, excess_errors : array, shape (n, c)
-        By how much each constraint is broken, at most 0 where it is kept; standard errors.
-    """
+    """What was evaluated: n designs (n, d)."""
 
     designs: Array
     values: Array
     errors: Array
+    """values and errors, shape (n, m): objectives, all minimised, NaN where they failed; their standard errors."""
     excess: Array
     excess_errors: Array
+    """excess and excess_errors, shape (n, c): by how much each constraint is broken, at most 0 where it is kept."""
 
 
 @dataclass(frozen=True)
 class Space:
-    """Where designs are.
-
-    Attributes
-    ----------
-    bounds : array, shape (d, 2)
-    directions : array, shape (k, m)
-        Weights of the objectives in each sum whose least value counts; the first is what counts most.
-    exact : sequence of functions or None, length m
-        Objectives that are known as functions of designs, (n, d) to (n,).
-    margins : array, shape (c,)
-        By how much each constraint is to be kept at least, so that it can be shown.
-    snap : function
-        Designs (n, d) to the nearest ones that there are: values from a catalogue, say.
-    trends : sequence of functions, length m + c
-        What a cheaper model says of objectives, then of constraints, of designs (n, d) to (n,); empty without one.
-    """
+    """Where designs are: within `bounds`, shape (d, 2)."""
 
     bounds: Array
     directions: Array
-    exact: Sequence[Exact | None]
+    """Weights (k, m) of the objectives in each sum whose least value counts; the first is what counts most."""
+    exact: Sequence[OfDesigns | None]
+    """Of each objective how it is known, (n,); None where it is not."""
     margins: Array
-    snap: Snap = lambda designs: designs
-    trends: Sequence[Exact] = ()
+    """By how much each constraint is to be kept at least, so that it can be shown, (c,)."""
+    snap: OfDesigns = np.asarray
+    """The nearest designs that there are, (n, d): values from a catalogue, say."""
+    trends: Sequence[OfDesigns] = ()
+    """What a cheaper model says of objectives, then of constraints, (n,) each; empty without one."""
+
+    def apart(self, designs: Array, one: Array) -> Array:
+        """How far designs (n, d) are from one (d,), over the ranges, (n,): the largest of all coordinates."""
+        return np.asarray((abs(designs - one) / np.ptp(self.bounds, axis=1)).max(axis=1))
 
 
 @dataclass(frozen=True)
@@ -86,7 +73,7 @@ class Trended:
 
     rest: Kriging
     slope: float
-    trend: Exact
+    trend: OfDesigns
 
     def predict(self, points: Array) -> Array:
         """What is expected at points, (n, d) to (n,)."""
@@ -102,37 +89,24 @@ def _flat(points: Array) -> Array:
 
 
 class Beliefs:
-    """Models of all objectives and constraints over designs.
+    """Models of all objectives and constraints over designs. Raises InputError: fewer than d + 3 finite values.
 
-    Attributes
-    ----------
-    believed : array, shape (n, m)
-        Objectives of the designs that were evaluated.
-    allowed : array, shape (n,)
-        Which of them are likely to keep the constraints.
-
-    Raises
-    ------
-    InputError
-        Fewer than d + 3 finite values.
+    `believed` (n, m): objectives of the designs that were evaluated; `allowed` (n,): which of them are likely to keep the
+    constraints.
     """
 
     def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
         self.known, self.space, self.rng = known, space, rng
         count = len(space.exact)
         trends = space.trends or [_flat] * (count + known.excess.shape[1])
-        self.models = [
-            None if exact else _trended(known.designs, values, errors, trend, space.bounds, rng)
-            for values, errors, exact, trend in zip(
-                known.values.T, known.errors.T, space.exact, trends[:count], strict=True
-            )
-        ]
-        self.limits = [
-            _trended(known.designs, values, errors, trend, space.bounds, rng)
-            for values, errors, trend in zip(
-                known.excess.T, known.excess_errors.T, trends[count:], strict=True
-            )
-        ]
+
+        def model(values: Array, errors: Array, trend: OfDesigns) -> Trended:
+            return _trended(known.designs, values, errors, trend, space.bounds, rng)
+
+        each = zip(space.exact, known.values.T, known.errors.T, trends[:count], strict=True)
+        self.models = [None if exact else model(*one) for exact, *one in each]
+        kept = zip(known.excess.T, known.excess_errors.T, trends[count:], strict=True)
+        self.limits = [model(*one) for one in kept]
         self.pending = known.designs[:0]
         self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
         self.believed = self.means(known.designs)
@@ -155,8 +129,7 @@ class Beliefs:
     @property
     def noise(self) -> Array:
         """Variance of the error of one more design's objectives, (m,)."""
-        rests = [None if one is None else one.rest for one in self.models]
-        return np.array([0.0 if one is None else _noise(one) for one in rests])
+        return np.array([0.0 if one is None else _noise(one.rest) for one in self.models])
 
     def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
         """By how much constraints are expected to be broken, margins included, and standard deviations, (n, c) each."""
@@ -187,7 +160,7 @@ def _trended(
     designs: Array,
     values: Array,
     errors: Array,
-    trend: Exact,
+    trend: OfDesigns,
     bounds: Array,
     rng: np.random.Generator,
 ) -> Trended:
@@ -217,18 +190,10 @@ def _fitted(
     shares = np.ones(len(values))
     shares[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
     low, high = (max(factor * middle / size**2, 1e-8) for factor in NOISE)
-    limits = low, max(high, 10.0 * low)
     return fit_kriging(
-        designs,
-        values,
-        bounds,
-        rng=rng,
-        restarts=1,
-        lengths=LENGTHS,
-        kernel=MATERN,
-        noise=limits,
-        shares=shares,
-    )
+        designs, values, bounds, rng=rng, restarts=1, lengths=LENGTHS, kernel=MATERN,
+        noise=(low, max(high, 10.0 * low)), shares=shares,
+    )  # fmt: skip
 
 
 def _noise(model: Kriging) -> float:

@@ -63,12 +63,12 @@ def proposed(beliefs: Beliefs, direction: Array | None) -> tuple[Array, float]:
 
 def farthest(beliefs: Beliefs) -> tuple[Array, float]:
     """The design, (d,), that is farthest from all that are known, where constraints are likely kept; and how far."""
-    return _best(
-        beliefs,
-        lambda points: np.where(
-            _apart(points, beliefs), _distance(beliefs, points) * beliefs.feasible(points), 0.0
-        ),
-    )
+
+    def merit(points: Array) -> Array:
+        away = _distance(beliefs, points)
+        return np.where(away > NEAR, away * beliefs.feasible(points), 0.0)
+
+    return _best(beliefs, merit)
 
 
 def expected(beliefs: Beliefs, direction: Array, margins: Array | None = None) -> Array:
@@ -104,13 +104,12 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     paths = np.tile(mean, (DRAWS, 1))
     paths[:, order - 1] += draws[:, :rank] @ np.tril(factor)[:, :rank].T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)
-    width = np.ptp(beliefs.space.bounds, axis=1)
     rows = list[int]()
     for path in paths:
         if len(rows) == count or not new.any():
             break
         rows.append(int(np.where(new, path, np.inf).argmin()))
-        new &= (abs(points - points[rows[-1]]) / width).max(axis=1) > NEAR
+        new &= beliefs.space.apart(points, points[rows[-1]]) > NEAR
     return points[rows], float(loss.mean())
 
 
@@ -149,9 +148,8 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
         def nearer(points: Array) -> Array:
             means, spreads = beliefs.shortfalls(points)
             rows = np.arange(len(points)), means.argmax(axis=1)
-            return gain(np.full(len(points), least), means[rows], spreads[rows]) * _apart(
-                points, beliefs
-            )
+            won = gain(np.full(len(points), least), means[rows], spreads[rows])
+            return won * _apart(points, beliefs)
 
         return nearer
     weights = beliefs.rng.dirichlet(np.ones(front.shape[1]))
@@ -192,12 +190,10 @@ def volume(front: Array, mean: Array, deviation: Array) -> Array:
     extent = np.where(extent > 0.0, extent, 1.0)
     first, second = ((points - low) / extent).T
     mean, deviation = (mean - low) / extent, deviation / extent
-    left, right = (
-        gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0]),
-        np.append(1.1, second),
-    )
+    left = gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0])
     strips = np.diff(left, axis=0, prepend=0.0)  # between one point and the next
-    return np.asarray((strips * gain_to(right, mean[:, 1], deviation[:, 1])).sum(axis=0))
+    heights = gain_to(np.append(1.1, second), mean[:, 1], deviation[:, 1])
+    return np.asarray((strips * heights).sum(axis=0))
 
 
 def gain_to(levels: Array, mean: Array, deviation: Array) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.plugins.sources import raised
+from hpcclear.plugins.sources import in_use
 from hpcclear.statistics.surrogate.leaf import Columns, checked_samples, inside
 
 KEY = "study.surrogate.model"
@@ -206,24 +206,19 @@ def _called(source: object, label: str, seed: int) -> object:
     if not callable(source):
         reason = "is no class, no function and has no predict"
         raise InputError(KEY, label, reason, "Give it fit(X, y) and predict(X)")
-    try:
+    with in_use(KEY, label, "could not be made"):
         own = inspect.signature(source).parameters
         if "random_state" in own and own["random_state"].default in (None, inspect.Parameter.empty):
             return source(random_state=seed)
         return source()
-    except Exception as error:
-        raise raised(KEY, label, "could not be made", error) from error
 
 
 def _ask(model: object, label: str, what: str, *arguments: Array) -> object:
     """What a method of the regressor returns, with one thread: more would change last bits."""
     from threadpoolctl import threadpool_limits
 
-    try:
-        with threadpool_limits(limits=1):
-            return getattr(model, what)(*arguments)
-    except Exception as error:
-        raise raised(KEY, label, f"failed in {what}", error) from error
+    with in_use(KEY, label, f"failed in {what}"), threadpool_limits(limits=1):
+        return getattr(model, what)(*arguments)
 
 
 def _numbers(found: object, shape: tuple[int, ...], label: str, what: str) -> Array:

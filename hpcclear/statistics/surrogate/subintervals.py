@@ -6,7 +6,6 @@ then is cut in half across the input that varies fastest, down to a stated depth
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 
 import numpy as np
 
@@ -41,7 +40,6 @@ class _Box:
 class SubintervalSettings:
     """When a box is accepted, and what is done until it is."""
 
-    cuts: Sequence[int] | None = None  # subintervals of each input to begin with; 1 each
     samples: int = 200  # training points of a box
     test_samples: int = 100
     r2_min: float = 0.99  # a box is accepted with at least this on its test points
@@ -68,11 +66,14 @@ def fit_subintervals(
     of its own, spawned from this one; `method`: what is fitted; `snap`: points (n, d) to the nearest that exist. Raises
     InputError as the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
-    pending = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng)
-    done: list[tuple[Leaf, Accuracy, bool]] = []
-    counts = settings.samples, settings.test_samples
-    for box in pending:
-        box.wanted = [snap(latin_hypercube(n, box.bounds, box.rng)) for n in counts]
+    domain = np.asarray(bounds, dtype=np.float64)
+    counts, nothing = (
+        (settings.samples, settings.test_samples),
+        (np.empty((0, len(domain))), np.empty(0)),
+    )
+    whole = _Box(domain, rng.spawn(1)[0], *nothing, *nothing)
+    whole.wanted = [snap(latin_hypercube(n, domain, whole.rng)) for n in counts]
+    pending, done = [whole], list[tuple[Leaf, Accuracy, bool]]()
     while pending:
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
@@ -92,24 +93,10 @@ def fit_subintervals(
             else:
                 done.append((model, reached, accepted))
         pending = following
-    return _joined(done)
-
-
-def _first_boxes(
-    bounds: np.ndarray, cuts: Sequence[int] | None, rng: np.random.Generator
-) -> list[_Box]:
-    """The grid of subintervals to begin with, each without points."""
-    dims = len(bounds)
-    pieces = (1,) * dims if cuts is None else tuple(cuts)
-    edges = [
-        np.linspace(low, high, piece + 1) for (low, high), piece in zip(bounds, pieces, strict=True)
-    ]
-    corners = list(product(*(range(piece) for piece in pieces)))
-    nothing = np.empty((0, dims)), np.empty(0)
-    return [
-        _Box(np.array([edges[d][k : k + 2] for d, k in enumerate(corner)]), own, *nothing, *nothing)
-        for corner, own in zip(corners, rng.spawn(len(corners)), strict=True)
-    ]
+    done.sort(key=lambda one: tuple(one[0].lower))
+    models, judged, good = zip(*done, strict=True)
+    r2, rmae = (np.array([getattr(one, name) for one in judged]) for name in ("r2", "rmae"))
+    return Piecewise(models, r2, rmae, np.array(good))
 
 
 def _evaluate_wanted(evaluate: Evaluate, boxes: list[_Box]) -> None:
@@ -142,11 +129,3 @@ def _halves(box: _Box, dim: int) -> list[_Box]:
         here = (points[:, dim] < middle) if side == 0 else (points[:, dim] >= middle)
         halves.append(_Box(bounds, rng, points[here], values[here], *nothing, box.depth + 1))
     return halves
-
-
-def _joined(done: list[tuple[Leaf, Accuracy, bool]]) -> Piecewise:
-    """One object, boxes in the order of their lower corners."""
-    done = sorted(done, key=lambda item: tuple(item[0].lower))
-    models, reached, accepted = zip(*done, strict=True)
-    r2, rmae = (np.array([getattr(one, name) for one in reached]) for name in ("r2", "rmae"))
-    return Piecewise(models, r2, rmae, np.array(accepted))
