@@ -52,15 +52,9 @@ class WeightedDraws(NamedTuple):
 
 
 class Failures:
-    """Weighted draws of the designs of a case for its probabilities of failure.
+    """Weighted draws of the designs of a case for its probabilities of failure, `goals`.
 
-    Attributes
-    ----------
-    goals : list of Constraint
-    densities : list of Density
-        What is drawn from for each of them, once they are prepared.
-    drawn : dict of int to list of Block
-        Draws of designs by their numbers.
+    `densities`: what is drawn from for each of them, once they are prepared; `drawn`: draws of designs by their numbers.
     """
 
     def __init__(self, run: StudyRun, case: Case, rng: np.random.Generator) -> None:

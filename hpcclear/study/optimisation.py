@@ -47,11 +47,10 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
         count = len(case.goals)
         values = padded[..., -count:]
         reference = np.nanmax(values, axis=(0, 1)) * 1.1
+        areas = [hypervolume(solutions[:, -count:], reference) for solutions in fronts]
         result[f"front_{index}"] = padded
         result[f"gain_{index}"] = np.array(gains)
-        result[f"hypervolume_{index}"] = np.array(
-            [hypervolume(solutions[:, -count:], reference) for solutions in fronts]
-        )
+        result[f"hypervolume_{index}"] = np.array(areas)
     return result
 
 
@@ -74,13 +73,7 @@ def _begun(
         objectives=objectives,
         rng=rng,
         iterations=settings.iterations,
-        settings=SwarmSettings(
-            particles=settings.particles,
-            c1=settings.c1,
-            c2=settings.c2,
-            inertia_first=settings.inertia[0],
-            inertia_last=settings.inertia[1],
-        ),
+        settings=SwarmSettings(settings.particles, settings.c1, settings.c2, *settings.inertia),
     )
     name = settings.algorithm or "swarm"
     if name == "swarm":
@@ -120,25 +113,16 @@ def _minimised(
 
 @dataclass(frozen=True)
 class Choice:
-    """A design chosen for direct simulation.
-
-    Attributes
-    ----------
-    name, case : str
-        The name is empty until a design has earned one.
-    design : dict of str to float
-        SI.
-    place : (int, int) or None
-        Run of the swarm and solution, for one that stands on a front.
-    origin : str
-        "search", or "given": the baseline design, and what a publication prints.
-    """
+    """A design of a case, SI, chosen for direct simulation."""
 
     name: str
+    """Empty until a design has earned one."""
     case: str
     design: Mapping[str, float]
     place: tuple[int, int] | None = None
+    """Run of the swarm and solution, for one that stands on a front."""
     origin: str = "search"
+    """Or "given": the baseline design, and what a publication prints."""
 
 
 def choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
@@ -176,15 +160,13 @@ def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
             best = np.nanargmin(padded[..., column], axis=1)
             own = padded[np.arange(len(padded)), best]
             average = own[:, :-count].mean(axis=0)
-            chosen.append(
-                Choice(
-                    f"{case.name} averaged {letter}", case.name, _design(run, case.name, average)
-                )
-            )
             winner = int(own[:, column].argmin())
+            middle, end = choices(run, case.name, np.stack([average, own[winner, :-count]]))
             place = winner, int(best[winner])
-            design = _design(run, case.name, own[winner, :-count])
-            chosen.append(Choice(f"{case.name} best {letter}", case.name, design, place))
+            chosen += [
+                replace(middle, name=f"{case.name} averaged {letter}"),
+                replace(end, name=f"{case.name} best {letter}", place=place),
+            ]
     return chosen
 
 
@@ -201,12 +183,8 @@ def spread(run: StudyRun, fronts: Result) -> list[Choice]:
         ends = np.unique(values.argmin(axis=0))  # one may have the least of several
         wanted = cut(values, run.study.verification.designs + len(ends))
         inner = wanted[~np.isin(wanted, ends)]
-        for row in inner[np.argsort(values[inner, 0], kind="stable")]:
-            number_of_run, solution = (int(index) for index in places[row])
-            design = _design(run, case.name, points[row, :-count])
-            chosen.append(Choice("", case.name, design, (number_of_run, solution)))
+        rows = inner[np.argsort(values[inner, 0], kind="stable")]
+        found = choices(run, case.name, points[rows, :-count])
+        where = map(tuple, places[rows].tolist())
+        chosen += [replace(one, place=place) for one, place in zip(found, where, strict=True)]
     return chosen
-
-
-def _design(run: StudyRun, case: str, coordinates: Array) -> Mapping[str, float]:
-    return choices(run, case, coordinates[None])[0].design

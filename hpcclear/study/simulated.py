@@ -25,14 +25,8 @@ Asked = tuple[Array, Array]
 
 
 class Simulated:
-    """Designs of a case in their order, with their simulations.
-
-    Attributes
-    ----------
-    choices : list of Choice
-    made : list of arrays, shape (responses, replicates, values)
-        As `hpcclear.study.truth.made` returns them.
-    """
+    """Designs of a case in their order, `choices`, with their simulations, `made`, as `hpcclear.study.truth.made` returns
+    them."""
 
     def __init__(
         self, run: StudyRun, case: Case, guesses: Guesses, start: Sequence[Choice]

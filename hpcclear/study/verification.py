@@ -1,5 +1,6 @@
 """Verified designs: which of them is alpha, beta and the front, and where the surrogate missed the truth."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,23 +28,20 @@ ROUND_OFF = 1.0001
 
 def original(run: StudyRun) -> list[Choice]:
     """The design in the scene file, in each case."""
-    found = []
-    for case in run.study.cases:
-        names = run.study.design_variables(case.name)
-        design = {n: run.scene.baseline(n) for n in names}
-        found.append(Choice(f"{case.name} original", case.name, design, origin="given"))
-    return found
+    designs = {
+        case.name: {n: run.scene.baseline(n) for n in run.study.design_variables(case.name)}
+        for case in run.study.cases
+    }
+    return [Choice(f"{name} original", name, one, None, "given") for name, one in designs.items()]
 
 
 def predicted(run: StudyRun, choices: Sequence[Choice], model: Piecewise) -> Array:
     """Mean and standard deviation by the surrogate, (n, 2); NaN outside its domain."""
     problems = {case.name: problem_of(run.scene, case.name, model) for case in run.study.cases}
-    found = [
-        problems[choice.case].moments(
-            np.array([[choice.design[name] for name in problems[choice.case].names]])
-        )[0]
-        for choice in choices
-    ]
+    found = []
+    for choice in choices:
+        problem = problems[choice.case]
+        found += [problem.moments(np.array([[choice.design[name] for name in problem.names]]))[0]]
     return np.array(found).reshape(-1, 2)
 
 
@@ -73,12 +71,10 @@ def undecided(run: StudyRun, choices: Sequence[Choice], true: Result) -> list[st
             if case.kept and one.case == case.name:
                 state = together(true["verdict"][row, : len(case.kept)].astype(int).tolist())
                 met.setdefault(state, []).append((float(true["goal"][row, 0]), row))
-        kept, (value, row) = (
-            min(met.get(Verdict.HOLDS, [(np.nan, 0)])),
-            min(met.get(Verdict.UNDECIDED, [(np.inf, 0)])),
-        )
-        if value < kept[0]:
-            won = f"{(kept[0] - value) / abs(kept[0]):.2g}" if kept[0] else f"{kept[0] - value:.2g}"
+        kept, _ = min(met.get(Verdict.HOLDS, [(np.nan, 0)]))
+        value, row = min(met.get(Verdict.UNDECIDED, [(np.inf, 0)]))
+        if value < kept:
+            won = f"{(kept - value) / (abs(kept) or 1.0):.2g}"
             words, price = goal.words(run.scene.objective.unit), np.nanmax(true["price"][row])
             needs = f"; about {price:.0f} simulations would decide" if np.isfinite(price) else ""
             texts.append(
@@ -89,31 +85,21 @@ def undecided(run: StudyRun, choices: Sequence[Choice], true: Result) -> list[st
 
 @dataclass(frozen=True)
 class NamedDesigns:
-    """Verified designs under their names.
-
-    Attributes
-    ----------
-    choices : list of Choice
-        Alpha, beta (and further ends) and the front of each case, then all others that were verified. An end of the swarm
-        that is also alpha or beta stands there twice.
-    rows : list of int
-        Number of each in what was simulated.
-    equivalent : list of list of str
-        All designs of its case that it is statistically indistinguishable from.
-    dominated : list of bool
-        Whether another design of its case is significantly better in all that the case makes small.
-    deciding : list of bool
-        Whether a decision is between it and others: the baseline, the ends of the front, and what is recommended.
-    recommended : list of bool
-        Whether it is recommended in its case.
-    """
+    """Verified designs under their names."""
 
     choices: list[Choice]
+    """Alpha, beta (and further ends) and the front of each case, then all others that were verified. An end of the swarm that
+    is also alpha or beta stands there twice."""
     rows: list[int]
+    """Number of each in what was simulated."""
     equivalent: list[list[str]]
+    """All designs of its case that each is statistically indistinguishable from."""
     dominated: list[bool]
+    """Whether another design of its case is significantly better in all that the case makes small."""
     deciding: list[bool]
+    """Whether a decision is between it and others: the baseline, the ends of the front, and what is recommended."""
     recommended: list[bool]
+    """Whether it is recommended in its case."""
 
 
 def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> NamedDesigns:
@@ -157,24 +143,20 @@ def _name_case(
     front = mine.front(run.study.verification.designs + count) if known else []
     merit = values[:, 0] + SPAN * values[:, 1] if case.plain else values[:, 0]
     recommended = min(ours, key=lambda k: float(merit[k])) if known else ends[0]
-    inner = sorted(
-        {*(ours[k] for k in front), recommended} - {*ends}, key=lambda k: float(values[k, 0])
-    )
+    between = {*(ours[k] for k in front), recommended} - {*ends}
+    inner = sorted(between, key=lambda k: float(values[k, 0]))
     named = [*zip(ends, case.ends, strict=True)]
     named += [(k, f"{case.name} front {number + 1}") for number, k in enumerate(inner)]
     taken = {k for k, _ in named}
     left = [k for k in range(len(rows)) if k not in taken or choices[rows[k]].name]
-    unnamed = [k for k in left if not choices[rows[k]].name]
-    named += [
-        (k, choices[rows[k]].name or f"{case.name} candidate {unnamed.index(k) + 1}") for k in left
-    ]
+    numbers = itertools.count(1)
+    named += [(k, choices[rows[k]].name or f"{case.name} candidate {next(numbers)}") for k in left]
     best_name = next(name for k, name in named if k == recommended)
     for k, name in named:
         table.choices.append(replace(choices[rows[k]], name=name))
         table.rows.append(rows[k])
-        table.equivalent.append(
-            [label for j, label in named if everything.one[j, k] and label != name]
-        )
+        alike = [label for j, label in named if everything.one[j, k] and label != name]
+        table.equivalent.append(alike)
         table.dominated.append(bool(everything.beaten[k]))
         table.recommended.append(name == best_name)
         table.deciding.append(name in (f"{case.name} original", *case.ends, best_name))
@@ -208,9 +190,8 @@ def _goals(run: StudyRun, table: NamedDesigns, true: Result) -> dict[str, Array]
         there = np.array([goal is not None for goal in asked])
         data[f"{name}_goal"] = np.array([goal.words(unit) if goal else "" for goal in asked])
         data[f"{name}_unit"] = np.array([goal.unit(unit) if goal else "" for goal in asked])
-        data[f"{name}_usual"] = np.array(
-            [goal.usual if goal else Usual.OTHER for goal in asked], np.int8
-        )
+        usual = [goal.usual if goal else Usual.OTHER for goal in asked]
+        data[f"{name}_usual"] = np.array(usual, np.int8)
         for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
@@ -226,18 +207,15 @@ def _constraints(cases: Sequence[Case], unit: str, true: Result) -> dict[str, Ar
     """Values of the constraints of the cases of designs (n,) with confidence intervals, and the verdicts on them."""
     many = max(len(case.kept) for case in cases)
     rows = [[*case.kept, *[None] * (many - len(case.kept))] for case in cases]
+    words = [[one.words(unit) if one else "" for one in row] for row in rows]
+    units = [[one.unit(unit) if one else "" for one in row] for row in rows]
+    most = [[one.most if one else np.nan for one in row] for row in rows]
     data = {
-        "constraint_goal": np.array(
-            [[one.words(unit) if one else "" for one in row] for row in rows]
-        ),
-        "constraint_unit": np.array(
-            [[one.unit(unit) if one else "" for one in row] for row in rows]
-        ),
-        "constraint_most": np.array([[one.most if one else np.nan for one in row] for row in rows]),
+        "constraint_goal": np.array(words),
+        "constraint_unit": np.array(units),
+        "constraint_most": np.array(most),
         "constraint_price": true["price"][:, :many],
-        "constraint_verdict": np.where(
-            np.isnan(true["verdict"][:, :many]), ABSENT, true["verdict"][:, :many]
-        ).astype(np.int8),
+        "constraint_verdict": np.nan_to_num(true["verdict"][:, :many], nan=ABSENT).astype(np.int8),
     }
     for end in ("", "_lower", "_upper"):  # they stand behind what a case makes small
         values = np.full((len(rows), many), np.nan)

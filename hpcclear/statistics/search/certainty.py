@@ -10,21 +10,10 @@ from hpcclear.statistics.random.replicates import surely_less
 class Compared:
     """Designs whose objectives were estimated from the same replicates, pair by pair.
 
-    Parameters
-    ----------
-    values : array, shape (n, m)
-        Objectives, all minimised; a design with NaN is never on a front.
-    shifts : array, shape (m, n, r)
-        Influence of each replicate (`hpcclear.statistics.random.replicates.Estimate`).
-    confidence : float
-        Level of each comparison.
-    near : array, shape (m,), or None
-        By how much designs may differ in each objective to be called equally good, however little is known of them.
-
-    Attributes
-    ----------
-    less : array, shape (m, n, n)
-        Whether design i is significantly less than design j in an objective.
+    `values` (n, m): objectives, all minimised; a design with NaN is never on a front. `shifts` (m, n, r): influence of each
+    replicate (`hpcclear.statistics.random.replicates.Estimate`). `confidence`: of each comparison. `near` (m,): by how much
+    designs may differ in each objective to be called equally good, however little is known of them. `less` (m, n, n): whether
+    design i is significantly less than design j in an objective.
     """
 
     def __init__(
@@ -55,12 +44,8 @@ class Compared:
 
     def best(self, objective: int) -> int:
         """The design with the least of an objective; of those that are statistically indistinguishable from it, and no more
-        than `near` above it, the best in the others, one after the other in their order.
-
-        Raises
-        ------
-        ValueError
-            If no design has objectives.
+        than `near` above it, the best in the others, one after the other in their order. Raises ValueError if no design has
+        objectives.
         """
         level = self.known
         *earlier, last = sorted(range(len(self.less)), key=lambda k: (k != objective, k))

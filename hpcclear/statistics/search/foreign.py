@@ -51,27 +51,17 @@ def __getattr__(name: str) -> Callable[[SearchTask], "Pymoo"]:
 
 
 class Pymoo:
-    """An algorithm of pymoo as a `hpcclear.statistics.search.asking.Search`.
+    """An algorithm of pymoo, not set up yet, as a `hpcclear.statistics.search.asking.Search`.
 
-    Parameters
-    ----------
-    algorithm : pymoo.core.algorithm.Algorithm
-        Not set up yet.
-    task : Task
-        The algorithm's seed is drawn from its generator.
+    Its seed is drawn from the generator of the task.
     """
 
     def __init__(self, algorithm: Any, task: SearchTask) -> None:
         from pymoo.core.problem import Problem
 
-        shape = {"n_var": len(task.bounds), "n_obj": task.objectives, "n_ieq_constr": 1}
-        seed = int(task.rng.integers(2**31))
-        algorithm.setup(
-            Problem(**shape, xl=0.0, xu=1.0),
-            termination=("n_eval", task.evaluations),
-            seed=seed,
-            verbose=False,
-        )
+        problem = Problem(len(task.bounds), task.objectives, n_ieq_constr=1, xl=0.0, xu=1.0)
+        end, seed = ("n_eval", task.evaluations), int(task.rng.integers(2**31))
+        algorithm.setup(problem, termination=end, seed=seed, verbose=False)
         self._algorithm, self._bounds = algorithm, task.bounds
         self._asked: Any = None
 
@@ -113,12 +103,9 @@ def _begun(name: str, task: SearchTask) -> Pymoo:
     try:
         importlib.import_module("pymoo")
     except ModuleNotFoundError:
-        raise InputError(
-            KEY,
-            f"pymoo:{name}",
-            "is an algorithm of pymoo, which is not installed",
-            f"{installing('pymoo')}, or leave the entry out",
-        ) from None
+        reason = "is an algorithm of pymoo, which is not installed"
+        remedy = f"{installing('pymoo')}, or leave the entry out"
+        raise InputError(KEY, f"pymoo:{name}", reason, remedy) from None
     module = importlib.import_module(f"pymoo.algorithms.moo.{ALGORITHMS[name]}")
     entries: dict[str, Any] = {"pop_size": task.particles}
     if name in DIRECTED:

@@ -44,16 +44,9 @@ BROKEN_ANEW = 0.3
 class ParticleSwarm:
     """A particle swarm that requests points to evaluate and receives their objectives.
 
-    Parameters
-    ----------
-    bounds : array_like, shape (d, 2)
-        Lower and upper bound of each variable.
-    iterations : int
-        Number of `tell` calls; sets the slope of the inertia weight (k_max of eq. 23).
-    rng : numpy.random.Generator
-        Owned by the swarm from here on.
-    start : array_like, shape (k, d), optional
-        Known designs that replace the first k random particles.
+    `bounds` (d, 2): lower and upper bound of each variable; `iterations`: number of `tell` calls, which sets the slope of the
+    inertia weight (k_max of eq. 23); `rng`: owned by the swarm from here on; `start` (k, d): known designs that replace the
+    first k random particles.
     """
 
     def __init__(
