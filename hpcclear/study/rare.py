@@ -153,26 +153,20 @@ def probabilities(
 ) -> list[FailureEstimate]:
     """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long; without pilots
     where `densities` of like designs are known."""
-    rates = [
-        Rare(
-            len(run.study.case(one.choice.case).random),
-            _limit(one),
-            NEGLIGIBLE * one.goal.most,
-            one.before,
-            known,
-        )
-        for one, known in itertools.zip_longest(asked, densities)
-    ]
+    rates = []
+    for one, known in itertools.zip_longest(asked, densities):
+        assert one.goal.limit is not None  # by validation
+        size, negligible = len(run.study.case(one.choice.case).random), NEGLIGIBLE * one.goal.most
+        rates.append(Rare(size, one.goal.limit, negligible, one.before, known))
     unknown = [k for k, one in enumerate(rates) if one.density is None]
     begun = [rates[k].prepared(run.rng("rare", purpose, "pilot")) for k in unknown]
     _together(run, [asked[k] for k in unknown], begun, stage)  # all meet the same draws
     open_, round_ = list(range(len(asked))), 0
     while open_:
-        rngs = [_streams(run, purpose, round_) for _ in open_]
-        going = [
-            rates[k].lengthened(max(rates[k].f.shape[1], LENGTH), own)
-            for k, own in zip(open_, rngs, strict=True)
-        ]
+        going = []
+        for one in (rates[k] for k in open_):  # all meet the same draws
+            rngs = [run.rng("rare", purpose, str(round_), str(k)) for k in range(REPEATS)]
+            going.append(one.lengthened(max(one.f.shape[1], LENGTH), rngs))
         _together(run, [asked[k] for k in open_], going, stage)
         round_ += 1
         open_ = [
@@ -205,16 +199,6 @@ def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> Non
     tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known and not one.plain]
     _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
     run.simulations.next = tight.simulations.next
-
-
-def _limit(one: Failing) -> float:
-    assert one.goal.limit is not None  # by validation
-    return one.goal.limit
-
-
-def _streams(run: StudyRun, purpose: str, round_: int) -> list[np.random.Generator]:
-    """Random numbers of each repeat in a round, the same for all designs."""
-    return [run.rng("rare", purpose, str(round_), str(k)) for k in range(REPEATS)]
 
 
 def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:

@@ -18,7 +18,7 @@ from hpcclear.statistics.sensitivity.intervals import IntervalDesign, IntervalSe
 from hpcclear.statistics.sensitivity.selection import select_influential
 from hpcclear.statistics.sensitivity.sobol import analyse_sobol, noise_share, sobol_design
 from hpcclear.statistics.surrogate import surface_search
-from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
+from hpcclear.statistics.surrogate.metrics import Accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.statistics.surrogate.surface_search import SearchSettings, SurfaceSearch
 from hpcclear.study.run import Result, StudyRun
@@ -176,12 +176,10 @@ def _levels(last: Sampled) -> Result:
     The mean of a Latin hypercube has only the scatter that is left after all that is additive in
     the inputs (Stein 1987, doi:10.1080/00401706.1987.10488205); a linear fit takes most of it.
     """
-    design = last.design
-    shape = len(design.intervals), len(design.clearances), -1
-    whole, cut = last.values.reshape(shape)[0], design.settings.n_points
-    points = design.points[:, :-1].reshape(*shape, design.points.shape[1] - 1)[0]
-    found = np.full((2, len(whole)), np.nan)
-    for level, (at, outcomes) in enumerate(zip(points[:, :cut], whole[:, :cut], strict=True)):
+    design, cut = last.design, last.design.settings.n_points
+    points, values = (part[0, :, :cut] for part in design.by_surface(last.values))
+    found = np.full((2, len(values)), np.nan)
+    for level, (at, outcomes) in enumerate(zip(points, values, strict=True)):
         if np.isfinite(outcomes).sum() > at.shape[1] + 2:
             plane = fit_response_surface(at, outcomes, design.intervals[0], 1)
             error = np.sqrt(plane.residual_variance / plane.n_points)
@@ -239,22 +237,14 @@ def _surface(
     run: StudyRun, sampled: Sampled, level: int
 ) -> tuple[Accuracy | None, int, int, int, bool]:
     """Accuracy, order, points and terms of a surface at a level, and whether it was accepted."""
-    inputs, design, values = sampled
-    settings, laid_out = run.study.sensitivity, design.settings
-    size = laid_out.n_points + laid_out.n_test
-    rows = slice(level * size, (level + 1) * size)
-    points, outcomes = design.points[rows, :-1], values[rows]
-    bounds, cut = design.intervals[0], laid_out.n_points
-    finite = np.isfinite(outcomes)
-    reached, count, terms = None, int(finite[:cut].sum()), 0
-    if count >= laid_out.needed(len(inputs)) and finite[cut:].sum() >= 2:
-        surface = fit_response_surface(
-            points[:cut], outcomes[:cut], bounds, laid_out.order, chosen=laid_out.chosen
-        )
-        reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
-        terms = len(surface.coefficients)
-    accepted = reached is not None and reached.meets(settings.r2, settings.rmae)
-    return reached, laid_out.order, count, terms, accepted
+    settings, laid_out = run.study.sensitivity, sampled.design.settings
+    points, values = (part[0, level] for part in sampled.design.by_surface(sampled.values))
+    surface, reached = sampled.design.fitted(0, points, values)
+    count = int(np.isfinite(values[: laid_out.n_points]).sum())
+    if surface is None or reached is None:
+        return None, laid_out.order, count, 0, False
+    accepted = reached.meets(settings.r2, settings.rmae)
+    return reached, laid_out.order, count, len(surface.coefficients), accepted
 
 
 def _searched(

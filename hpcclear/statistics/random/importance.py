@@ -115,7 +115,6 @@ def _logs(u: Array, centres: Array, factors: Array) -> Array:
 
 def fitted(u: Array, weights: Array) -> Density:
     """The density that fits weighted draws, (n, d) and (n,), by expectation and maximisation."""
-    size = u.shape[1]
     share = np.minimum(weights, CLIPPED * weights.mean())
     share = share / share.sum()
     whole = _covariance(u, share, share @ u)
@@ -137,7 +136,6 @@ def fitted(u: Array, weights: Array) -> Density:
         covariances = np.array(
             [_covariance(u, one, centre) for one, centre in zip(belongs.T, centres, strict=True)]
         )
-    assert covariances.shape == (count, size, size)
     return Density(parts, centres, covariances)
 
 
@@ -177,9 +175,8 @@ def pilot(
         if last or weights.sum() / known.sum() < negligible:
             break
         if level <= reached:
-            return (
-                Density.own(dimensions) if _little(weights, weights[f[elite] > limit]) else density
-            )
+            little = _little(weights, weights[f[elite] > limit])
+            return Density.own(dimensions) if little else density
         reached, last = level, level >= limit  # once more at the limit
     return density
 

@@ -100,7 +100,8 @@ def _(law: Uniform, centres: Array, length: float) -> Array:
 def _(law: Normal, centres: Array, length: float) -> Array:
     if law.reach == inf:
         return _normal_kernel_integral(law, centres, length, -inf, inf)
-    return _normal_kernel_integral(law, centres, length, *law.span) / _mass(law)
+    mass = float(_normal_between(*map(np.float64, _limits(law))))
+    return _normal_kernel_integral(law, centres, length, *law.span) / mass
 
 
 @kernel_integral.register
@@ -131,7 +132,10 @@ def nodes_needed(law: Quantiles, length: float, tolerance: float, most: int) -> 
     narrow = length / sqrt(2)
     low, high = law.span
     centres = np.linspace(low - 3 * narrow, high + 3 * narrow, 201)
-    exact = kernel_integral(_inside(law) if isinstance(law, Normal) else law, centres, narrow)
+    cut = law
+    if isinstance(law, Normal) and law.reach == inf:
+        cut = Normal(law.middle, law.deviation, TAIL * law.deviation)
+    exact = kernel_integral(cut, centres, narrow)
     for count in range(1, most + 1):
         nodes, weights = rule(law, count)
         kernels = np.exp(-0.5 * ((nodes[:, None] - centres) / narrow) ** 2)
@@ -148,21 +152,10 @@ def _table(law: Quantiles) -> Rule:
     return law(ndtr(places)), weights / weights.sum()
 
 
-def _inside(law: Normal) -> Normal:
-    """What is left of it inside its span."""
-    return Normal(law.middle, law.deviation, TAIL * law.deviation) if law.reach == inf else law
-
-
 def _limits(law: Normal) -> tuple[float, float]:
     """Ends of its span in standard deviations."""
     low, high = law.span
     return (low - law.middle) / law.deviation, (high - law.middle) / law.deviation
-
-
-def _mass(law: Normal) -> float:
-    """Probability of its span, of the normal that is not cut off."""
-    low, high = _limits(law)
-    return float(_normal_between(np.float64(low), np.float64(high)))
 
 
 @lru_cache(maxsize=256)

@@ -219,20 +219,16 @@ def _thin(values: Array, capacity: int) -> tuple[Booleans, Array]:
     for _ in range(count - capacity):
         gone = -1
         for i in range(count):
-            if alive[i] and not pinned[i] and (gone < 0 or _closer(distance, i, gone)):
+            if not alive[i] or pinned[i]:
+                continue
+            own = distance[i, 0], distance[i, 1]
+            if gone < 0 or own < (distance[gone, 0], distance[gone, 1]):
                 gone = i
         alive[gone] = False
         for i in range(count):
             if alive[i] and (neighbour[i, 0] == gone or neighbour[i, 1] == gone):
                 _nearest(square, alive, i, distance, neighbour)
     return alive, np.sqrt(distance[alive, 0])
-
-
-@cached
-def _closer(distance: Array, i: int, j: int) -> bool:
-    if distance[i, 0] != distance[j, 0]:
-        return bool(distance[i, 0] < distance[j, 0])
-    return bool(distance[i, 1] < distance[j, 1])
 
 
 @cached

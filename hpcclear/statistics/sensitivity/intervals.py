@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
@@ -57,6 +57,29 @@ class IntervalDesign:
     clearances: Array
     """Shape (c,)."""
     settings: IntervalSettings
+
+    def by_surface(self, values: ArrayLike) -> tuple[Array, Array]:
+        """Variables (k, c, n, d) and values (k, c, n) of the points of each surface, from f at all points."""
+        shape = len(self.intervals), len(self.clearances), -1
+        variables = self.points[:, :-1].reshape(*shape, self.intervals.shape[1])
+        return variables, np.asarray(values, float).reshape(shape)
+
+    def fitted(
+        self, k: int, points: Array, values: Array, spare: int = 0
+    ) -> tuple[ResponseSurface | None, Accuracy | None]:
+        """The surface over interval k through its training points, and its accuracy on its test points.
+
+        None where failures left less than the points that are needed and `spare` more, or fewer than two to test.
+        """
+        cut, limits, settings = self.settings.n_points, self.intervals[k], self.settings
+        if np.isfinite(values[:cut]).sum() < settings.needed(len(limits)) + spare:
+            return None, None
+        surface = fit_response_surface(
+            points[:cut], values[:cut], limits, settings.order, chosen=settings.chosen
+        )
+        if np.isfinite(values[cut:]).sum() < 2:
+            return surface, None
+        return surface, accuracy(values[cut:], surface.predict(points[cut:]))
 
 
 @dataclass(frozen=True)
@@ -121,19 +144,19 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
     `values` (n,): f at `design.points`; those that are not finite are failed simulations, counted in `failed`. A surface left
     with too few points is NaN in the history. Raises InputError if no surface at all can be fitted.
     """
-    steps, n_variables, _ = design.intervals.shape
-    shape = steps, len(design.clearances)
-    y = np.asarray(values, float).reshape(*shape, -1)
-    x = design.points[:, :-1].reshape(*y.shape, n_variables)
-    slope, error = gradient = np.full((2, *shape, n_variables), np.nan)
-    r2, rmae, left_out = quality = np.full((3, *shape), np.nan)
+    x, y = design.by_surface(values)
+    shape = y.shape[:2]
+    slope, error = gradient = np.full((2, *shape, x.shape[-1]), np.nan)
+    r2, rmae, left_out = np.full((3, *shape), np.nan)
     freedom = np.zeros(shape, np.int64)
     for k, c in np.ndindex(*shape):
-        surface = _surface(design, k, x[k, c], y[k, c])
+        surface, tested = design.fitted(k, x[k, c], y[k, c], 1)
         if surface is not None:
             gradient[:, k, c] = surface.gradient(design.intervals[k].mean(axis=1))
-            quality[:, k, c] = *_tested(design, surface, x[k, c], y[k, c]), surface.leave_one_out_r2
+            left_out[k, c] = surface.leave_one_out_r2
             freedom[k, c] = surface.degrees_of_freedom
+        if tested is not None:
+            r2[k, c], rmae[k, c] = tested.r2, tested.rmae
     failed = np.count_nonzero(~np.isfinite(y), axis=2)
     if not freedom.any():
         reason = "too many simulations failed to fit a surface"
@@ -141,26 +164,3 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
         raise InputError("values", int(failed.sum()), reason, remedy)
     where, order = (design.intervals, design.clearances), design.settings.order
     return SensitivityHistory(*where, slope, error, r2, rmae, left_out, freedom, failed, order)
-
-
-def _surface(
-    design: IntervalDesign, k: int, points: Array, values: Array
-) -> ResponseSurface | None:
-    """Surface over interval k on its training points; None if failures left too few of them."""
-    limits, settings = design.intervals[k], design.settings
-    values = values[: settings.n_points]
-    if np.count_nonzero(np.isfinite(values)) <= settings.needed(len(limits)):
-        return None
-    at = points[: len(values)]
-    return fit_response_surface(at, values, limits, settings.order, chosen=settings.chosen)
-
-
-def _tested(
-    design: IntervalDesign, surface: ResponseSurface, points: Array, values: Array
-) -> tuple[float, float]:
-    """R2 and RMAE on the test points; NaN if fewer than two of them succeeded."""
-    points, values = points[design.settings.n_points :], values[design.settings.n_points :]
-    if np.count_nonzero(np.isfinite(values)) < 2:
-        return float("nan"), float("nan")
-    reached = accuracy(values, surface.predict(points))
-    return reached.r2, reached.rmae

@@ -42,47 +42,30 @@ COLUMNS: Columns = {
 
 @dataclass(frozen=True, eq=False)
 class Kriging:
-    """A fitted Kriging model: arrays that suffice to predict.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the d inputs.
-    lower, upper : (d,) arrays
-        The box the model holds in; it refuses to answer outside.
-    length_scales : (d,) array
-        In the unit cube (multiples of ``upper - lower``).
-    signal_variance, noise_variance : float
-        In units of ``scale**2``.
-    mean, scale : float
-        Average and standard deviation of the training values (scale 1 if they are all equal).
-    inputs : (n, d) array
-    values : (n,) array
-        The training points that were used, in the user's units.
-    alpha : (n,) array
-        ``(K + noise I)^-1 (values - mean) / scale``.
-    dropped : int
-        Samples that had failed (NaN) and were left out of the fit.
-    kernel : str
-        One of `hpcclear.statistics.surrogate.kernels.KERNELS`.
-    shares : (n,) array, optional
-        Noise variance of each training value over `noise_variance`; not stored, for no prediction needs it.
-    """
+    """A fitted Kriging model of d inputs and n training points: arrays that suffice to predict."""
 
     names: tuple[str, ...]
     lower: np.ndarray
     upper: np.ndarray
+    """lower and upper (d,): the box the model holds in; it refuses to answer outside."""
     length_scales: np.ndarray
+    """In the unit cube (multiples of ``upper - lower``), (d,)."""
     signal_variance: float
     noise_variance: float
+    """signal_variance and noise_variance: in units of ``scale**2``."""
     mean: float
     scale: float
+    """mean and scale: average and standard deviation of the training values (scale 1 if they are all equal)."""
     inputs: np.ndarray
     values: np.ndarray
+    """inputs (n, d) and values (n,): the training points that were used, in the user's units."""
     alpha: np.ndarray
+    """``(K + noise I)^-1 (values - mean) / scale``, (n,)."""
     dropped: int = 0
+    """Samples that had failed (NaN) and were left out of the fit."""
     kernel: Kernel = SQUARED_EXPONENTIAL
     shares: np.ndarray | None = None
+    """Noise variance of each training value over `noise_variance`, (n,); not stored, for no prediction needs it."""
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "length_scales", "inputs", "values", "alpha"):

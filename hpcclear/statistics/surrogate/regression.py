@@ -192,12 +192,9 @@ def made(source: object, label: str, seed: int) -> Any:
         reason = f"has no {' and no '.join(missing)}"
         raise InputError(KEY, label, reason, "Give it fit(X, y) and predict(X)")
     if hasattr(model, "get_params") and hasattr(model, "set_params"):
-        free = [
-            name
-            for name, value in model.get_params().items()
-            if name.rpartition("__")[2] == "random_state" and value is None
-        ]
-        model.set_params(**dict.fromkeys(free, seed))
+        free = [name for name, value in model.get_params().items() if value is None]
+        own = [name for name in free if name.rpartition("__")[2] == "random_state"]
+        model.set_params(**dict.fromkeys(own, seed))
     return model
 
 
@@ -227,14 +224,11 @@ def _numbers(found: object, shape: tuple[int, ...], label: str, what: str) -> Ar
     try:
         array = np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(
-            KEY, label, f"its {what} returned {type(found).__name__}", remedy
-        ) from None
-    if array.shape != shape:
-        reason = f"its {what} returned shape {array.shape}, not {shape}"
-        raise InputError(KEY, label, reason, remedy)
-    if not np.isfinite(array).all():
-        count = int(np.count_nonzero(~np.isfinite(array)))
-        reason = f"its {what} returned {count} of {array.size} numbers that are not finite"
-        raise InputError(KEY, label, reason, remedy)
-    return array
+        words = type(found).__name__
+    else:
+        count, words = np.count_nonzero(~np.isfinite(array)), f"shape {array.shape}, not {shape}"
+        if array.shape == shape and not count:
+            return array
+        if array.shape == shape:
+            words = f"{count} of {array.size} numbers that are not finite"
+    raise InputError(KEY, label, f"its {what} returned {words}", remedy)

@@ -25,45 +25,30 @@ OUTSIDE = 1e-9  # in half-lengths: how far rounding may carry a point past a bou
 
 @dataclass(frozen=True)
 class ResponseSurface:
-    """A fitted polynomial ``f(x) = offset + sum coefficients * z**exponents``, z in [-1, 1].
-
-    Attributes
-    ----------
-    bounds : numpy.ndarray, shape (d, 2)
-        Lower and upper limit of every input, in its own unit.
-    order : int
-        Total order.
-    exponents : numpy.ndarray of int, shape (t, d)
-        One row a term.
-    coefficients : numpy.ndarray, shape (t,)
-        Of the scaled inputs, in the unit of f; the offset is already in the constant term.
-    unscaled_covariance : numpy.ndarray, shape (t, t)
-        (X'X)^-1; times `residual_variance` it is the covariance of the coefficients.
-    residual_variance : float
-        SSE / degrees of freedom, no less than the rounding of the values; NaN without any
-        degrees of freedom. Of chosen terms no less than the mean square error at points left out
-        of the choice.
-    degrees_of_freedom : int
-        Points that counted minus terms.
-    leave_one_out_errors : numpy.ndarray, shape (n,)
-        Error at each point of the surface fitted without it, its terms as they stand.
-    leave_one_out_r2 : float
-        1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms
-        that of points left out of the choice as well.
-    n_points : int
-        Points that counted, whose value was finite.
-    """
+    """A fitted polynomial ``f(x) = offset + sum coefficients * z**exponents`` of t terms, z in [-1, 1]."""
 
     bounds: Array
+    """Lower and upper limit of every input, in its own unit, shape (d, 2)."""
     order: int
+    """Total order."""
     exponents: Integers
+    """Shape (t, d)."""
     coefficients: Array
+    """Of the scaled inputs, in the unit of f, shape (t,); the offset is already in the constant term."""
     unscaled_covariance: Array
+    """(X'X)^-1, shape (t, t); times `residual_variance` it is the covariance of the coefficients."""
     residual_variance: float
+    """SSE / degrees of freedom, no less than the rounding of the values; NaN without any degrees of freedom. Of chosen terms no
+    less than the mean square error at points left out of the choice."""
     degrees_of_freedom: int
+    """Points that counted minus terms."""
     leave_one_out_errors: Array
+    """Error at each point (n,) of the surface fitted without it, its terms as they stand."""
     leave_one_out_r2: float
+    """1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms that of points left out of the
+    choice as well."""
     n_points: int
+    """Points that counted, whose value was finite."""
 
     def predict(self, points: ArrayLike) -> Array:
         """Values at points of shape (n, d), in the unit of f, shape (n,).
@@ -142,20 +127,18 @@ def fit_response_surface(
     rounding = (ROUNDING * np.abs(y).max()) ** 2
     errors = leave_one_out(residuals, np.sum(left**2, axis=1))
     total = float(np.sum((y - y.mean()) ** 2))
+    missed = least * len(y) if chosen else np.sum(errors**2)
+    variance = max(float(residuals @ residuals) / freedom, rounding, least) if freedom else np.nan
     return ResponseSurface(
         bounds=limits,
         order=order,
         exponents=exponents,
         coefficients=coefficients,
         unscaled_covariance=inverse @ inverse.T,
-        residual_variance=max(float(residuals @ residuals) / freedom, rounding, least)
-        if freedom
-        else float("nan"),
+        residual_variance=float(variance),
         degrees_of_freedom=freedom,
         leave_one_out_errors=errors,
-        leave_one_out_r2=float(1 - (least * len(y) if chosen else np.sum(errors**2)) / total)
-        if total > len(y) * rounding
-        else float("nan"),
+        leave_one_out_r2=float(1 - missed / total) if total > len(y) * rounding else float("nan"),
         n_points=len(y),
     )
 
