@@ -200,9 +200,8 @@ class Accumulator:
         ]
         later = range(self._next, -(-self.total // self.block))
         fresh = (n * self.block for n in later if n not in self._ahead and n not in self._open)
-        missing += [
-            np.arange(first, min(first + self.block, self.total)) for first in islice(fresh, blocks)
-        ]
+        for first in islice(fresh, blocks):
+            missing.append(np.arange(first, min(first + self.block, self.total)))
         return np.concatenate([np.empty(0, np.int64), *missing])
 
     def summed_blocks(self) -> list[int]:

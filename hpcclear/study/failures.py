@@ -139,7 +139,7 @@ def excess_of(goal: Constraint, made: Array, design: Mapping[str, float]) -> Exc
     if part < 1 or len(f) < FEWEST:
         return Excess(np.nan, np.nan, np.full(REPLICATES, np.nan))
     if HITS <= (f > goal.limit).sum() <= len(f) - HITS:
-        value, error = _index_of(goal, one.value, own := float(spread(one.shifts[None])[0]))
+        value, error = _index_of(goal, one.value, own := one.error)
         return Excess(value, error, one.shifts * (error / own if own > 0.0 else 0.0))
     parts = f[: part * REPLICATES].reshape(REPLICATES, part)
     without = np.array([np.delete(parts, k, axis=0).ravel() for k in range(REPLICATES)])

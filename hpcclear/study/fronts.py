@@ -35,9 +35,7 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
         searched = [f"searched_{name}" for name in ORDINALS[: most_of(run.study.cases)]]
         data |= {name: np.full(shape, np.nan) for name in searched}
         for column, name in enumerate(searched):
-            asked = [
-                None if case.plain else case.goals[column : column + 1] for case in run.study.cases
-            ]
+            asked = [() if case.plain else case.goals[column:] for case in run.study.cases]
             data[f"{name}_goal"] = np.array([one[0].words(unit) if one else "" for one in asked])
             data[f"{name}_unit"] = np.array([_unit(one[0], unit) if one else "" for one in asked])
     for k, case in enumerate(cases):

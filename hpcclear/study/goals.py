@@ -90,9 +90,9 @@ def beyond(goal: Goal, values: Array) -> float:
     assert goal.limit is not None  # by validation
     own = values[goal.place] if values.ndim == 3 else values
     known = own[np.isfinite(own)]
-    return (
-        float(tail.beyond(known[None], goal.limit)[0]) if len(known) >= replicates.FEWEST else 0.0
-    )
+    if len(known) < replicates.FEWEST:
+        return 0.0
+    return float(tail.beyond(known[None], goal.limit)[0])
 
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:

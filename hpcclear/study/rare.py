@@ -121,9 +121,8 @@ def _enter(
     column = len(run.study.case(one.choice.case).goals) + k
     _replace(true, row, its.own, ("goal_lower", "goal_upper"), column)
     _replace(true, row, its.sure, ("sure_lower", "sure_upper"), k)
-    true["goal"][row, column] = np.clip(
-        its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
-    )
+    ends = true["goal_lower"][row, column], true["goal_upper"][row, column]
+    true["goal"][row, column] = np.clip(its.own.value, *ends)
     true["counted"][row, k], true["taken"][row, k] = its.draws, its.taken
     true["rare_samples"][row] += its.simulations
 

@@ -115,9 +115,8 @@ def _designs(run: StudyRun) -> list[IntervalDesign]:
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(
-            intervals.design_intervals(box(run.scene, names).bounds, clearances, rng, laid_out)
-        )
+        bounds = box(run.scene, names).bounds
+        found.append(intervals.design_intervals(bounds, clearances, rng, laid_out))
     return found
 
 

@@ -135,12 +135,10 @@ class Simulated:
             if guessed and row not in self._guessed:
                 self._guessed[row] = self._guesses.of(choice, self._guesses.length)
             made = (self._guessed if guessed else self.made)[row][..., :length]
-            values = [
-                goals.goal_value(goal, made, choice.design, 0.95) for goal in self._case.goals
-            ]
-            rows = [(one.value, float(spread(one.shifts[None])[0]), one.shifts) for one in values]
-            rows += [excess_of(goal, made, choice.design) for goal in self._case.kept]
-            kept[row, length] = (
-                np.array([one[:2] for one in rows]).T, np.array([one[2] for one in rows]),
-            )  # fmt: skip
+            asked, design = self._case.goals, choice.design
+            values = [goals.goal_value(goal, made, design, 0.95) for goal in asked]
+            rows = [(one.value, one.error, one.shifts) for one in values]
+            rows += [excess_of(goal, made, design) for goal in self._case.kept]
+            found = np.array([one[:2] for one in rows]).T
+            kept[row, length] = found, np.array([one[2] for one in rows])
         return kept[row, length]

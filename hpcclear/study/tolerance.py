@@ -342,8 +342,8 @@ def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tu
         f"{_percents(share)}, by pairs at {pairs}; standard errors: {_percents(doubt)}."
     )
     limit = ROOM * (wanted if run.study.paired else worst)
-    remarks = []
-    if (share > limit).any():
+    remarks, dominates = [], (share > limit).any()
+    if dominates:
         tenths = max(np.ceil(np.log((share / limit).max() * 1.5) / -np.log(FALL)), 1.0)
         lower = "numerics.target_error"
         if run.scene.numerics.target_error is None:
@@ -361,7 +361,7 @@ def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tu
         for one, text, best in zip(table.choices, texts, table.recommended, strict=True)
         if text and best
     ]
-    if run.study.paired and missed and not (share > limit).any():
+    if run.study.paired and missed and not dominates:
         remarks.append(
             f"The accuracy requested was not reached by {'; '.join(missed)}. Raise study.verification.most_samples."
         )

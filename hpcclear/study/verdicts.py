@@ -45,12 +45,9 @@ def level(settings: Verification, many: int, simulations: int) -> float:
 
     The last look that a design may get has half of its error, the one before a quarter, and so on.
     """
-    left = (
-        0
-        if settings.draws is not None
-        else math.log2(max(settings.most_samples / simulations, 1.0))
-    )
-    return 1.0 - (1.0 - settings.confidence) / many * 0.5 ** (1 + int(left))
+    longer = 1.0 if settings.draws is not None else settings.most_samples / simulations
+    left = int(math.log2(max(longer, 1.0)))
+    return 1.0 - (1.0 - settings.confidence) / many * 0.5 ** (1 + left)
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:

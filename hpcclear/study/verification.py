@@ -311,9 +311,8 @@ def write(
     coords = {"design": names, "rival": names}
     if "constraint_verdict" in data:
         coords["constraint"] = np.arange(data["constraint_verdict"].shape[1])
-    content = dataset.dataset(
-        "verification", coords, data, None, units, run.scene.objective, run.words
-    )
+    about = None, units, run.scene.objective, run.words
+    content = dataset.dataset("verification", coords, data, *about)
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}" if others else last

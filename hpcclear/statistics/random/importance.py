@@ -98,9 +98,8 @@ class Density:
 
     def weights(self, u: Array) -> Array:
         """Density of the inputs over this one, (n,), at most 1 / `OWN`."""
-        logs = _logs(u, self._centres, self._factors) - _logs(
-            u, self._centres[:1], self._factors[:1]
-        )
+        own = _logs(u, self._centres[:1], self._factors[:1])
+        logs = _logs(u, self._centres, self._factors) - own
         return np.asarray(1.0 / (np.exp(np.minimum(logs, 700.0)) @ self._shares))
 
 
@@ -133,9 +132,8 @@ def fitted(u: Array, weights: Array) -> Density:
         belongs *= (share / belongs.sum(axis=1))[:, None]
         parts = (belongs.sum(axis=0) + 0.02) / (1.0 + 0.02 * count)
         centres = (belongs.T @ u + 1e-6 * centres) / (belongs.sum(axis=0)[:, None] + 1e-6)
-        covariances = np.array(
-            [_covariance(u, one, centre) for one, centre in zip(belongs.T, centres, strict=True)]
-        )
+        each = zip(belongs.T, centres, strict=True)
+        covariances = np.array([_covariance(u, *one) for one in each])
     return Density(parts, centres, covariances)
 
 

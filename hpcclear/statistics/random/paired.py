@@ -53,9 +53,8 @@ def deviation_change(on: Array, off: Array, confidence: float) -> Change:
     kept = np.isfinite(on).sum(axis=1) > 1
     if not _enough(on) or kept.sum() < FEWEST:
         return UNKNOWN
-    return _ratio(
-        np.nanstd(on[kept], axis=1, ddof=1), np.nanstd(off[kept], axis=1, ddof=1), confidence
-    )
+    first, second = (np.nanstd(one[kept], axis=1, ddof=1) for one in (on, off))
+    return _ratio(first, second, confidence)
 
 
 def point_change(on: Array, off: Array) -> float:

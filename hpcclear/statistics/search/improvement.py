@@ -98,9 +98,8 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
             square += weight**2 * model.rest.covariance(points)
     draws = beliefs.rng.standard_normal((DRAWS, len(points)))
     # Known designs have next to no variance, and round-off makes some of it negative: pivots end before these.
-    factor, order, rank, _ = dpstrf(
-        square, tol=ROUND_OFF * max(square.diagonal().max(), 0.0), lower=1
-    )
+    least = ROUND_OFF * max(square.diagonal().max(), 0.0)
+    factor, order, rank, _ = dpstrf(square, tol=least, lower=1)
     paths = np.tile(mean, (DRAWS, 1))
     paths[:, order - 1] += draws[:, :rank] @ np.tril(factor)[:, :rank].T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)

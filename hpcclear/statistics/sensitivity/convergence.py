@@ -89,12 +89,12 @@ def best_estimates(
     """
     start = np.maximum(intervals.plateau, 0)[np.newaxis]
     bounded = ~intervals.found & (intervals.plateau >= 0)
-    slope = np.take_along_axis(history.sensitivity, start, axis=0)[0]
-    error = np.take_along_axis(history.standard_error, start, axis=0)[0]
-    return (
-        np.where(bounded, slope, intervals.sensitivity),
-        np.where(bounded, error, intervals.uncertainty),
-    )
+
+    def best(each: Array, there: Array) -> Array:
+        return np.where(bounded, np.take_along_axis(each, start, axis=0)[0], there)
+
+    slope = best(history.sensitivity, intervals.sensitivity)
+    return slope, best(history.standard_error, intervals.uncertainty)
 
 
 def _student(freedom: Integers, doubt: float) -> Array:

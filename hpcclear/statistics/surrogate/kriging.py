@@ -115,11 +115,9 @@ class Kriging:
 
         Raises InputError: a point lies outside the box (or is NaN): the model does not extrapolate.
         """
-        points = inside(points, self.names, self.lower, self.upper)
-        summed = kernel_sum if self.kernel == SQUARED_EXPONENTIAL else matern_sum
-        return summed(
-            self.to_unit(points), self.packed[0], self.length_scales, self.packed[1], self.mean
-        )
+        unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
+        summed = kernel_sum if self.separable else matern_sum
+        return summed(unit, self.packed[0], self.length_scales, self.packed[1], self.mean)
 
     def variance(self, points: np.ndarray) -> np.ndarray:
         """Kriging variance (n,) of the smooth part at points (n, d), in squared units of the training values. Raises InputError

@@ -41,11 +41,8 @@ def inside(
     good = (points >= lower - slack) & (points <= upper + slack)  # False for NaN too
     if not good.all():
         row, column = np.argwhere(~good)[0]
-        raise InputError(
-            names[column],
-            float(points[row, column]),
-            f"outside the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]; "
-            "it does not extrapolate",
-            "evaluate inside the domain, or fit the surrogate on a wider one",
-        )
+        domain = f"the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]"
+        remedy = "evaluate inside the domain, or fit the surrogate on a wider one"
+        reason = f"outside {domain}; it does not extrapolate"
+        raise InputError(names[column], float(points[row, column]), reason, remedy)
     return points

@@ -129,9 +129,8 @@ def negative_likelihood(
     scaled = centred / np.exp(theta[1:-1])
     halves, ones = -0.5 * np.einsum("ij,ij->i", scaled, scaled), np.ones(count)
     # -|z_i - z_j|^2 / 2, with the logarithm of the signal where that is an exponent, as one product
-    exponents = np.column_stack([scaled, halves + level, ones]) @ np.vstack(
-        [scaled.T, ones, halves]
-    )
+    left, right = np.column_stack([scaled, halves + level, ones]), [scaled.T, ones, halves]
+    exponents = left @ np.vstack(right)
     smooth, slopes = with_slopes(exponents, theta[0], kernel)
     covariance = smooth.copy()
     covariance[np.diag_indices(count)] += noise * shares

@@ -39,11 +39,10 @@ def rows_of(
         size, places = len(leaf.values), [parameters.index(name) for name in leaf.names]
         data["training_output"][row, :size] = leaf.values
         data["used"][row, places] = 1
+        within = {"point": slice(size), "parameter": places}
         for name, (dim, attribute) in columns.items():
             if dim:
-                data[name][row, slice(size) if dim == "point" else places] = getattr(
-                    leaf, attribute
-                )
+                data[name][row, within[dim]] = getattr(leaf, attribute)
         for column, name in enumerate(leaf.names):
             data[name][row, :size] = leaf.inputs[:, column]
             data[f"{name}_lower"][row] = leaf.lower[column]
@@ -107,14 +106,12 @@ def _leaf(one: Mapping[str, np.ndarray], family: str, known: list[str]) -> Leaf:
         for name, (dim, attribute) in columns.items()
         if name in one
     }
-    shape = (
-        names,
-        np.array([float(one[f"{name}_lower"]) for name in names]),
-        np.array([float(one[f"{name}_upper"]) for name in names]),
+    lower, upper = (
+        np.array([float(one[f"{name}_{end}"]) for name in names]) for end in ("lower", "upper")
     )
     inputs = np.column_stack([one[name][:size] for name in names])
     values = one["training_output"][:size]
     if not foreign:
-        return Kriging(*shape, inputs=inputs, values=values, **found)
+        return Kriging(names, lower, upper, inputs=inputs, values=values, **found)
     stored = {name: found.pop(name) for name in regression.PREDICTED if name in found}
-    return Regression(*shape, inputs, values, **found, stored=stored)
+    return Regression(names, lower, upper, inputs, values, **found, stored=stored)

@@ -67,10 +67,8 @@ def fit_subintervals(
     InputError as the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
     domain = np.asarray(bounds, dtype=np.float64)
-    counts, nothing = (
-        (settings.samples, settings.test_samples),
-        (np.empty((0, len(domain))), np.empty(0)),
-    )
+    counts = settings.samples, settings.test_samples
+    nothing = np.empty((0, len(domain))), np.empty(0)
     whole = _Box(domain, rng.spawn(1)[0], *nothing, *nothing)
     whole.wanted = [snap(latin_hypercube(n, domain, whole.rng)) for n in counts]
     pending, done = [whole], list[tuple[Leaf, Accuracy, bool]]()
