@@ -6,7 +6,7 @@ Where few or none of a design's simulations fail its index comes from the larges
 decide nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +64,8 @@ class Failures:
 
     def prepare(self, choice: Choice) -> None:
         """Find the densities of the failures of a design of which nothing is known."""
-        self.densities = [self._prepared(choice, goal) for goal in self.goals]
+        for goal in self.goals:
+            rare.answer(self._run, [rare.Failing(choice, goal)], [self._prepared(goal)], "search")
 
     def draw(self, choices: Sequence[Choice], rows: Sequence[int], length: int) -> None:
         """Take so many weighted draws of each repeat of some designs: the same of all."""
@@ -92,18 +93,12 @@ class Failures:
             return value, error
         return _index_of(self.goals[k], share, float(spread((each - share)[None])[0]))
 
-    def _prepared(self, choice: Choice, goal: Constraint) -> Density:
+    def _prepared(self, goal: Constraint) -> Generator[Array, Array, None]:
+        """Yield draws, take f there, and keep the density that is found."""
         assert goal.limit is not None  # by validation
         negligible = 0.05 * goal.most
         going = importance.pilot(self._inputs, goal.limit, self._rng, negligible, PILOT)
-        u = next(going)
-        while True:
-            (values,) = rare.simulated(self._run, [(choice, u)], "search")
-            try:
-                u = going.send(values[max(goal.place - 1, 0)])
-            except StopIteration as end:
-                density: Density = end.value
-                return density
+        self.densities.append((yield from going))
 
     def _renewed(self, k: int) -> Density:
         """The density of the failures of all designs near the threshold, each as important, if there are enough."""

@@ -124,11 +124,6 @@ def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
     return [of(goal) if goal.exact else None for goal in case.goals]
 
 
-def names_of(case: Case, unit: str) -> tuple[str, ...]:
-    """Objectives and constraints of a case in words, by the unit of f."""
-    return tuple(goal.words(unit) for goal in case.goals)
-
-
 def ends_in_all(study: Study) -> int:
     """How many ends the fronts of all cases have: one for each thing that a case makes small."""
     return sum(len(case.goals) for case in study.cases)

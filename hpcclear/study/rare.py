@@ -159,14 +159,14 @@ def probabilities(
         rates.append(Rare(size, one.goal.limit, negligible, one.before, known))
     unknown = [k for k, one in enumerate(rates) if one.density is None]
     begun = [rates[k].prepared(run.rng("rare", purpose, "pilot")) for k in unknown]
-    _together(run, [asked[k] for k in unknown], begun, stage)  # all meet the same draws
+    answer(run, [asked[k] for k in unknown], begun, stage)  # all meet the same draws
     open_, round_ = list(range(len(asked))), 0
     while open_:
         going = []
         for one in (rates[k] for k in open_):  # all meet the same draws
             rngs = [run.rng("rare", purpose, str(round_), str(k)) for k in range(REPEATS)]
             going.append(one.lengthened(max(one.f.shape[1], LENGTH), rngs))
-        _together(run, [asked[k] for k in open_], going, stage)
+        answer(run, [asked[k] for k in open_], going, stage)
         round_ += 1
         open_ = [
             k for k in open_
@@ -196,7 +196,7 @@ def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> Non
     """Take a few draws of each probability that is known again at a stricter tolerance; of plain ones pairs are known."""
     scene, left = tolerance.stricter(run.scene)
     tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known and not one.plain]
-    _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
+    answer(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
     run.simulations.next = tight.simulations.next
 
 
@@ -211,7 +211,7 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
     return goals.accurate(one.goal, _interval(one, rate, settings.confidence), run.study.wanted)
 
 
-def _together(
+def answer(
     run: StudyRun,
     asked: Sequence[Failing],
     going: Sequence[Generator[Array, Array, None]],

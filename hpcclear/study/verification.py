@@ -17,7 +17,7 @@ from hpcclear.scene.domain import bound_at, shares
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import contest
-from hpcclear.study.goals import excess, most_of, names_of, wanted
+from hpcclear.study.goals import excess, most_of, wanted
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
@@ -314,7 +314,7 @@ def write(
     about = None, units, run.scene.objective, run.words
     content = dataset.dataset("verification", coords, data, *about)
     if "first_goal" in content:
-        *others, last = names_of(study.cases[0], run.scene.objective.unit)
+        *others, last = (one.words(run.scene.objective.unit) for one in study.cases[0].goals)
         asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("equivalence", "dominated"):

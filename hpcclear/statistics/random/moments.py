@@ -125,14 +125,17 @@ class RobustObjective:
         Raises InputError as on a call.
         """
         rows = {name: np.atleast_2d(draws[name]) for name in self._wiring.random}
-        return self._sampled(self._checked(designs), rows)
+        found = [
+            self.model.predict(places.reshape(-1, places.shape[2])).reshape(places.shape[:2])
+            for places in self._places(self._checked(designs), rows)
+        ]
+        return np.concatenate(found) if found else np.empty((0, 1))
 
     def monte_carlo(
         self, designs: np.ndarray, samples: int, rng: np.random.Generator
     ) -> SampledMoments:
         """The same by Monte Carlo, `samples` fresh draws that all designs share, with errors."""
-        designs = self._checked(designs)
-        return sample_moments(self._sampled(designs, self._drawn(samples, rng)))
+        return sample_moments(self.sampled(designs, self._drawn(samples, rng)))
 
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
         """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
@@ -173,14 +176,6 @@ class RobustObjective:
                 own = np.stack([moments.mean, moments.deviation], axis=1)
             found.append(own)
         return np.concatenate(found) if found else np.empty((0, 2))
-
-    def _sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The surrogate at all draws of each design, ``(n, s)``."""
-        found = [
-            self.model.predict(places.reshape(-1, places.shape[2])).reshape(places.shape[:2])
-            for places in self._places(designs, draws)
-        ]
-        return np.concatenate(found) if found else np.empty((0, 1))
 
     def _places(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> Iterator[np.ndarray]:
         """Model inputs of all draws, ``(k, s, d)``, of so many designs at a time as memory holds."""
