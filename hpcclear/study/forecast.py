@@ -168,9 +168,8 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
                 counts += _rehearsed(run, count, designs, samples)
     except InputError:
         return sum(samples.values()), seconds
-    samples |= {
-        name: loads * round(counts[name] / times) for name in ("search", "verification", "pairs")
-    }
+    for name in ("search", "verification", "pairs"):
+        samples[name] = loads * round(counts[name] / times)
     return sum(samples.values()), pilot.seconds / pilot.count
 
 

@@ -68,13 +68,8 @@ def _begun(
 ) -> tuple[Search, SearchTask, str]:
     """The search of a study at its start, what it was made for, and its name."""
     settings = scene.required_study.swarm
-    task = SearchTask(
-        bounds=region.bounds,
-        objectives=objectives,
-        rng=rng,
-        iterations=settings.iterations,
-        settings=SwarmSettings(settings.particles, settings.c1, settings.c2, *settings.inertia),
-    )
+    own = SwarmSettings(settings.particles, settings.c1, settings.c2, *settings.inertia)
+    task = SearchTask(region.bounds, objectives, rng, settings.iterations, own)
     name = settings.algorithm or "swarm"
     if name == "swarm":
         return made(swarm, name, task), task, name

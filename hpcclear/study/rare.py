@@ -233,12 +233,11 @@ def answer(
 def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
     """Responses of designs at standard normals, (k, n) each: f, and `Study.further`; NaN where it failed, or where inputs so
     far out make no mechanism."""
-    rows = [rows_of(run, choice, u) for choice, u in where]
-    makes = [_valid(run, names, values) for names, values in rows]
-    batches = [
-        run.simulations.filled(names, values[good])
-        for (names, values), good in zip(rows, makes, strict=True)
-    ]
+    makes, batches = [], []
+    for choice, u in where:
+        names, own = rows_of(run, choice, u)
+        makes.append(good := _valid(run, names, own))
+        batches.append(run.simulations.filled(names, own[good]))
     values = np.concatenate([one.values for one in batches])
     points = Points(batches[0].names, values, batches[0].paths)
     f = np.empty((1 + len(run.study.further), 0))

@@ -229,13 +229,11 @@ def _known(
     """What the tolerance takes of designs by all their pairs: values (k, replicates, n), and the first at the stricter one."""
     scene, left = run.scene, stricter(run.scene)[1]
     responses = [0, *range(2, len(made[0]))]  # between them is whether beyond Hertz's range
-    apart = np.array(
-        [
-            [_apart(whole[k, : tight.shape[1], : tight.shape[2]], tight[k]) for k in responses]
-            for whole, tight in zip(made, strict, strict=True)
-        ]
-    )
-    bias, error = np.moveaxis(apart / (1.0 - left), 2, 0)
+    apart = []
+    for whole, tight in zip(made, strict, strict=True):
+        ours = whole[:, : tight.shape[1], : tight.shape[2]]
+        apart.append([_apart(ours[k], tight[k]) for k in responses])
+    bias, error = np.moveaxis(np.array(apart) / (1.0 - left), 2, 0)
     for case in {choice.case for choice in designs}:
         rows = [k for k, choice in enumerate(designs) if choice.case == case]
         for place in np.ndindex(bias.shape[1:]):

@@ -34,15 +34,14 @@ def scattered(
     Every design of a case meets the same scatter in a stage, so that differences between designs are not noise; pairs meet
     that of the verification.
     """
-    points = monte_carlo(
-        run.scene,
-        count,
-        random=run.study.case(choice.case).random,
-        design=dict(choice.design),
-        purpose="verification" if stage == "pairs" else stage,
-        first=first or 0,
-        replicate=None if first is None else range(REPLICATES),
+    random, purpose = (
+        run.study.case(choice.case).random,
+        "verification" if stage == "pairs" else stage,
     )
+    points = monte_carlo(
+        run.scene, count, random=random, design=dict(choice.design), purpose=purpose,
+        first=first or 0, replicate=None if first is None else range(REPLICATES),
+    )  # fmt: skip
     return run.simulations.filled(points.names, points.values)
 
 
@@ -193,6 +192,5 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         row["counted"] = padded([float(values.size)] * len(kept), held)
         row["beyond"] = padded([goals.beyond(goal, whole) for goal in kept], held)
         rows.append(row)
-    return verdicts.decided(
-        run, choices, {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    )
+    found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return verdicts.decided(run, choices, found)

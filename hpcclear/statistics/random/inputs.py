@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 
@@ -119,7 +120,7 @@ def tensor(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Node arrays of shape ``(n or 1, N_k)`` of several axes over their tensor, last axis fastest."""
     out = []
     for k, axis in enumerate(axes):
-        after = int(np.prod([other.shape[1] for other in axes[k + 1 :]], dtype=int))
-        before = int(np.prod([other.shape[1] for other in axes[:k]], dtype=int))
+        after = prod(other.shape[1] for other in axes[k + 1 :])
+        before = prod(other.shape[1] for other in axes[:k])
         out.append(np.tile(np.repeat(axis, after, axis=1), (1, before)))
     return out

@@ -2,7 +2,7 @@
 
 from functools import reduce
 from itertools import product
-from math import sqrt
+from math import prod, sqrt
 
 import numpy as np
 
@@ -26,13 +26,10 @@ class TensorRule:
     ) -> None:
         self.leaf, self.wiring = leaf, wiring
         self.counts = self._choose(tolerance, probes)
-        if np.prod([float(count) for count in self.counts.values()]) > MOST_TENSOR:
+        if prod(self.counts.values()) > MOST_TENSOR:
             raise InputError("random_inputs", self.counts, "too many nodes", 'use "monte-carlo"')
         self.moving = [group for group in wiring.groups if group.moves]
-        sizes = [
-            int(np.prod([self.counts[name] for name in group.sources], dtype=int))
-            for group in self.moving
-        ]
+        sizes = [prod(self.counts[name] for name in group.sources) for group in self.moving]
         self.sizes = np.array(sizes, dtype=np.int64)
         self.starts = np.cumsum([0, *(len(group.dims) for group in self.moving)])
         self.dims = np.array([dim for group in self.moving for dim in group.dims], dtype=np.int64)

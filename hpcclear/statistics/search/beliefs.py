@@ -84,10 +84,6 @@ class Trended:
         return self.rest.variance(points)
 
 
-def _flat(points: Array) -> Array:
-    return np.zeros(len(points))
-
-
 class Beliefs:
     """Models of all objectives and constraints over designs. Raises InputError: fewer than d + 3 finite values.
 
@@ -98,7 +94,8 @@ class Beliefs:
     def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
         self.known, self.space, self.rng = known, space, rng
         count = len(space.exact)
-        trends = space.trends or [_flat] * (count + known.excess.shape[1])
+        none = [lambda points: np.zeros(len(points))] * (count + known.excess.shape[1])
+        trends = space.trends or none
 
         def model(values: Array, errors: Array, trend: OfDesigns) -> Trended:
             return _trended(known.designs, values, errors, trend, space.bounds, rng)

@@ -79,7 +79,9 @@ class ParticleSwarm:
 
     def ask(self) -> Array:
         """Points to evaluate, shape (particles, d); the same ones until `tell` is called."""
-        return self._points(self._positions)
+        unit = self._positions
+        # this form meets both bounds exactly; the clip removes the last rounding error inside
+        return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
         """Take the objectives of the designs requested (`hpcclear.statistics.search.asking.Search`) and move on."""
@@ -90,10 +92,6 @@ class ParticleSwarm:
         self.iteration += 1
         if self.iteration < self.iterations:
             self._move()
-
-    def _points(self, unit: Array) -> Array:
-        # this form meets both bounds exactly; the clip removes the last rounding error inside
-        return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
 
     def _remember(self, values: Array, total: Array) -> None:
         """Update the personal bests: the new point unless the old one is better or equal."""
