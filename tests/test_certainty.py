@@ -125,6 +125,16 @@ def compared(values, error=1e-3):
     return Compared(np.array(values, float), shifts - shifts.mean(axis=2, keepdims=True), 0.95)
 
 
+@pytest.mark.parametrize("size", [1e-9, 1.0, 3e4])
+def test_round_off_makes_no_number_less_than_another(size):
+    """Of two designs with the same scatter the deviation is the same but for its last bit, and no replicate tells them apart."""
+    values = size * np.array([1.0, 1.0 - 2e-16, 1.0 - 1e-9])
+    shifts = np.tile(0.01 * size * np.random.default_rng(1).standard_normal(16), (3, 1))
+    less = surely_less(values, shifts, 0.95)
+    assert not less[:2, :2].any()
+    assert less[2, :2].all()
+
+
 def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
     values = [
         (1, 5),
@@ -145,6 +155,14 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
     assert not found.one[0, 1]
     assert found.beaten.tolist() == [False] * 6 + [True, False]
     assert found.front(2) == [1, 4]
+
+
+def test_a_design_that_is_nowhere_better_but_for_round_off_is_on_no_front():
+    """The worse of two designs is farther from all others, and lies in what both have alike a last bit lower."""
+    values = np.array([(1.0, 3.0), (2.0, 2.0), (2.5, 2.0 * (1.0 - 2e-16))])
+    noise = np.random.default_rng(4).normal(0.0, 1e-3, (3, 16))
+    shifts = np.stack([noise, np.tile(noise[0], (3, 1))])
+    assert Compared(values, shifts, 0.95).front(10) == [0, 1]
 
 
 # -- which end is one -------------------------------------------------------------------------------

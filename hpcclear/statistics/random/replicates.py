@@ -27,6 +27,9 @@ from hpcclear.statistics.random.survival import share_interval
 FEWEST = 4
 """Replicates, or values, from which on an error is reported."""
 
+ROUND_OFF = 1e-12
+"""Difference of two numbers, relative, up to which they are one."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -193,8 +196,8 @@ def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:
     """Whether number i is significantly less than number j, (n, n); False where it is undecided, each comparison two-sided.
 
     Replicates are paired: designs that meet the same scatter differ by less than their own errors. `shifts` (n, r): of
-    `Estimate`, of all numbers from the same replicates.
+    `Estimate`, of all numbers from the same replicates. Numbers that differ by round-off only are one.
     """
     error = np.array([spread(row - shifts) for row in shifts])
     reach = student(confidence, shifts.shape[1] - 1) * error
-    return values[:, None] - values < -reach
+    return values[:, None] - values < -np.maximum(reach, ROUND_OFF * abs(values))

@@ -68,7 +68,9 @@ class Compared:
             best = self.best(objective)
             if self.traded[best, taken].all():
                 taken.append(best)
-        rows = np.flatnonzero(self.known)
+        any_less = self.less.any(axis=0)
+        behind = (any_less & ~any_less.T)[self.known].any(axis=0)  # by one that is nowhere worse
+        rows = np.flatnonzero(self.known & ~behind)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)
         places = self.values / np.where(extent > 0.0, extent, 1.0)
