@@ -53,7 +53,7 @@ FIELDS = (
 EXACT = (15 / 13) ** 0.5 / student(0.95, 15)
 """Root mean square of what an exact interval of 16 replicates is off the truth, over its half-width."""
 
-VERIFICATION = {"designs": 4, "most_samples": 8192, "infill_rounds": 4}
+VERIFICATION = {"designs": 4, "most_samples": 8192}
 ACCURACY = {"mean": 0.002, "deviation": 0.005, "quantile": 0.005}
 
 

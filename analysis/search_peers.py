@@ -3,7 +3,7 @@
     python analysis/search_peers.py OUT            # ten studies, one after the other; writes results/search_peers.csv
     python analysis/search_peers.py OUT --workers 2
 
-The studies are those of `analysis/fresh_studies.py` from seed 1480 on; bounded probabilities below `RAREST` are left out, since
+The studies are those of `analysis/fresh_studies.py` from seed 1800 on; bounded probabilities below `RAREST` are left out, since
 `DRAWS` plain draws a design do not see such failures. Each study is carried out once. Each peer runs with several seeds until
 the median of their regrets is at most the study's plus `EQUAL`, the resolution of the judge; the least of `BUDGETS` at which
 that is so counts. Of the package `reached` is the same: what its search takes with the least of `ROUNDS` by which its regret is
@@ -52,8 +52,8 @@ from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 
 RESULTS = Path(__file__).parent / "results" / "search_peers.csv"
-FIRST, STUDIES, RAREST, ROUNDS = 1480, 10, 1e-2, (1, 2)
-DRAWS, BUDGETS, SEEDS, SLOW = 64, (1600, 3200, 6400, 12800, 25600, 51200), (1, 2, 3), 3200
+FIRST, STUDIES, RAREST, ROUNDS = 1800, 10, 1e-2, (1, 2)
+DRAWS, BUDGETS, SEEDS, SLOW = 64, (800, 1600, 3200, 6400, 12800, 25600, 51200), (1, 2, 3), 3200
 EQUAL, SURE, ABOVE = 5e-4, 0.9, 1e-3
 SEARCH = "kriging", "kriging check", "search"
 LOW, HIGH = np.array([PATHS[name][1:] for name in DESIGN]).T
@@ -273,8 +273,12 @@ def reached(peer: Any, draws: Any, regret: Any, own: float) -> dict[str, Any]:
     runs = [method(draws(seed, common), seed) for seed in SEEDS]
     budgets = [one for one in BUDGETS if one <= SLOW or method is not smt]
     cells: dict[str, Any] = {"simulations": f"> {budgets[-1]}", "above": 0, "broken": 0}
+    last = [next(run) for run in runs]
     for budget in budgets:
-        designs = [next(design for count, design in run if count * DRAWS >= budget) for run in runs]
+        for k, run in enumerate(runs):
+            while last[k][0] * DRAWS < budget:
+                last[k] = next(run)
+        designs = [design for _, design in last]
         found, broken = np.array(
             [regret(LOW + np.clip(one, 0.0, 1.0) * (HIGH - LOW)) for one in designs]
         ).T
