@@ -127,7 +127,7 @@ def compared(values, error=1e-3):
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 3e4])
 def test_round_off_makes_no_number_less_than_another(size):
-    """Of two designs with the same scatter the deviation is the same but for its last bit, and no replicate tells them apart."""
+    """Two designs with the same scatter have the same deviation but for its last bit: no replicate tells them apart."""
     values = size * np.array([1.0, 1.0 - 2e-16, 1.0 - 1e-9])
     shifts = np.tile(0.01 * size * np.random.default_rng(1).standard_normal(16), (3, 1))
     less = surely_less(values, shifts, 0.95)
