@@ -18,7 +18,7 @@ OPEN = "the integration tolerance leaves it open"
 """Said of a constraint that no number of simulations would decide."""
 
 
-class Constraint(NamedTuple):
+class JudgedConstraint(NamedTuple):
     """A constraint of a design: what is bounded, its unit, its simulated value with the ends of its interval, the bound."""
 
     goal: str
@@ -51,7 +51,7 @@ class Constraint(NamedTuple):
         return f"{text}, {self.bounded}" + (f" ({self.deciding})" if self.deciding else "")
 
 
-def constraints_of(one: Results) -> list[Constraint]:
+def constraints_of(one: Results) -> list[JudgedConstraint]:
     """Return the constraints of a design (of kind ``verification``)."""
     found = []
     for own in each(one, "constraint") if "constraint_verdict" in one else ():
@@ -61,7 +61,7 @@ def constraints_of(one: Results) -> list[Constraint]:
                 number_in(own, f"constraint_{name}") for name in names
             )
             words = text_in(own, "constraint_goal"), text_in(own, "constraint_unit")
-            found.append(Constraint(*words, true, lower, upper, most, Verdict(code), price))
+            found.append(JudgedConstraint(*words, true, lower, upper, most, Verdict(code), price))
     return found
 
 

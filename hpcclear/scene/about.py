@@ -1,10 +1,9 @@
 """What a machine is called and who answers for it: texts that pages and files show, and that change no result."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from hpcclear.scene.fields import Converted, Table, invalid
+from hpcclear.scene.fields import Converted, Entries, Table, invalid
 
 LONGEST = 120
 """Letters of a text."""
@@ -28,7 +27,7 @@ class ShortText(Converted):
         return {"type": "string", "minLength": 1, "maxLength": LONGEST}
 
 
-def inputs_of(content: Mapping[str, Any]) -> dict[str, Any]:
+def inputs_of(content: Entries) -> dict[str, Any]:
     """Return what results follow from: the content of a scene but for [about]."""
     return {name: table for name, table in content.items() if name != "about"}
 

@@ -11,13 +11,13 @@ the reciprocal of the square; F. H. Speckhart, "Calculation of tolerance based o
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import nearest
-from hpcclear.scene.fields import Number, Quantity, Table, check_known, invalid
+from hpcclear.scene.fields import Entries, Number, Quantity, Table, check_known, invalid
 from hpcclear.scene.fits import fit_of
 from hpcclear.scene.paths import flatten, quantities
 
@@ -44,7 +44,7 @@ class CatalogueRow(Table):
     """Values by path: numbers of the scene, SI, and entries of random inputs."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """Paths beside the name, as a file has them, as `entries` in SI."""
         if "entries" in row:
             return row

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
-from hpcclear.scene.fields import check_known, invalid
+from hpcclear.scene.fields import Entries, check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
@@ -15,7 +14,7 @@ from hpcclear.scene.slider_crank import JOINTS
 from hpcclear.scene.tables import SceneTables
 
 
-def _clearance_of_open_joints(data: Mapping[str, Any]) -> Mapping[str, Any]:
+def _clearance_of_open_joints(data: Entries) -> Entries:
     """Without a path of its own, C drives the clearances there are."""
     try:
         if data["mechanism"].get("kind") == "planar":
@@ -40,7 +39,7 @@ class ConsistentTables(SceneTables):
     """The tables of a scene file, each fitting the others."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
         if isinstance(row.get("format_version"), bool):  # equal to 1 in Python
             reason = "true or false is not a version"

@@ -1,14 +1,13 @@
 """What acts on the mechanism: contact, friction, gravity and loads, as in the scene file."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import field_validator
 
 from hpcclear.base.pieces import Rows
 from hpcclear.laws.declared import ContactLaw, FrictionLaw
 from hpcclear.scene.curves import Curve, Pairs, by_angle
-from hpcclear.scene.fields import Quantity, Speed, Table, invalid
+from hpcclear.scene.fields import Entries, Quantity, Speed, Table, invalid
 from hpcclear.scene.joints import JointFriction
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
 
@@ -114,7 +113,7 @@ class EffectTables(Table):
         return None
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         for key in ("friction", "guide_friction"):
             if isinstance(row.get(key), str) and row[key] != "none":
                 also = ' with law = "coulomb"' if key == "friction" else ""

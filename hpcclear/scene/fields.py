@@ -57,6 +57,8 @@ def hint(word: object) -> str:
 
 Content = dict[str, Any]
 """Tables as a file has them: numbers, texts, lists and tables by their names; whatever stands there until it is valid."""
+Entries = Mapping[str, Any]
+"""The same, not to be changed."""
 Tables = Mapping[str, object]
 """The same, to be read."""
 
@@ -102,7 +104,7 @@ class Table(BaseModel):
     """Keys that a user might expect here and that belong to another kind: reason and remedy."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """Entries of this class, of a table as a file has it; an error for validators where it makes none."""
         return row
 

@@ -7,13 +7,12 @@ deviations of bearing and tool catalogues, a textbook's tables of fundamental de
 
 import re
 from bisect import bisect_left
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from hpcclear.base import tolerances
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Bounds, Content, Quantity, Table, invalid
+from hpcclear.scene.fields import Bounds, Content, Entries, Quantity, Table, invalid
 
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 """Largest size of each range, mm."""
@@ -182,7 +181,7 @@ class Tolerance(Table):
     """Whether inspection rejects parts outside the limits of size."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         own = {"range": _DIAMETER.range(row["range"], "range")} if "range" in row else {}
         return {**row, **own}
 
@@ -228,7 +227,7 @@ def law_of(entries: Content) -> tolerances.FitClearance:
     return law
 
 
-def with_clearance(joint: Mapping[str, Any]) -> Content:
+def with_clearance(joint: Entries) -> Content:
     """Entries of a joint in the file with `clearance` and `bearing_radius` in place of a fit or a diametral clearance."""
     for key in ("fit", "diametral_clearance"):
         beside = [other for other in INSTEAD[key] if other in joint]

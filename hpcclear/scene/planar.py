@@ -12,7 +12,7 @@ from hpcclear.scene import fields
 from hpcclear.scene.contacts import KINDS as LOOSE
 from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
-from hpcclear.scene.fields import Count, NamedRows, Quantity, Table, invalid, nearest
+from hpcclear.scene.fields import Count, Entries, NamedRows, Quantity, Table, invalid, nearest
 from hpcclear.scene.joints import PlanarFixed, PlanarRevolute
 from hpcclear.scene.loads import AnyLoad
 
@@ -192,7 +192,7 @@ class Planar(Table):
                     check_period(curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}")
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
         what they do not say, points are a body's own."""
         written = dict(row)

@@ -12,7 +12,16 @@ from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.plugins import DISTRIBUTIONS
 from hpcclear.plugins.sources import SCIPY
-from hpcclear.scene.fields import LONGEST_CURVE, Bounds, Content, Number, Numbers, Quantity, invalid
+from hpcclear.scene.fields import (
+    LONGEST_CURVE,
+    Bounds,
+    Content,
+    Entries,
+    Number,
+    Numbers,
+    Quantity,
+    invalid,
+)
 from hpcclear.scene.fits import Tolerance, law_of
 from hpcclear.scene.named import NamedInput, Range, with_paths
 from hpcclear.scene.paths import quantities
@@ -237,7 +246,7 @@ class RandomInput(NamedInput):
     "truncated-normal", "beta", "fit" and "wear"."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """The row with its paths, and numbers in the unit of these."""
         row, paths = with_paths(row)
         quantity = quantities()[paths[0]]

@@ -14,7 +14,16 @@ from hpcclear.scene.contacts.guide import Guide, PlanarSlide
 from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
 from hpcclear.scene.driving import CrankSpeed, CrankTorque, PlanarDrive, PlanarSpeed, PlanarTorque
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import Inertia, Length, Mass, NamedPlace, PositiveLength, Table, invalid
+from hpcclear.scene.fields import (
+    Entries,
+    Inertia,
+    Length,
+    Mass,
+    NamedPlace,
+    PositiveLength,
+    Table,
+    invalid,
+)
 from hpcclear.scene.joints import IdealPinFriction, Material, Materials, PlanarRevolute
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.planar import BarBending, Ground, Planar, PlanarBody, PlanarJoint
@@ -81,7 +90,7 @@ class IdealJoint(Table):
     """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         # What a clearance joint needs may stay in the file, so that `--set
         # joints.crank_rod.kind=ideal` is enough to switch one off; it is dropped here, so that it
         # cannot make two equal scenes look different.

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from hpcclear.base.arithmetic import names_in
 from hpcclear.base.errors import at
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.cases import Case, in_si
-from hpcclear.scene.fields import check_known, invalid
+from hpcclear.scene.fields import Entries, check_known, invalid
 from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import Sensitivity, of_both
@@ -23,7 +22,7 @@ class Study(StudyTables):
     """Sampling and optimisation over a scene."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """Cases as plain lists of names, random inputs with the paths of the variable of that name,
         and the sensitivity's parameter."""
         data = dict(row)

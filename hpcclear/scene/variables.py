@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import PrivateAttr
@@ -11,7 +11,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import at
 from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, CatalogueRow, Cost
-from hpcclear.scene.fields import Bounds, Content, Number, Numbers, Quantity, invalid
+from hpcclear.scene.fields import Bounds, Content, Entries, Number, Numbers, Quantity, invalid
 from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities
 
@@ -90,7 +90,7 @@ class StudyVariable(NamedInput):
         return {**kept, "paths": (), "follows": tuple(of_rows)}
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         """The row with its paths, and numbers in the unit of these."""
         row, paths = with_paths(cls._without_numbers(row))
         kinds = [key for key in _KINDS if key in row]

@@ -1,14 +1,14 @@
 """A pin with clearance: a journal in a round bearing larger than itself, also with an oil film and surfaces out of round."""
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.written import shown
 from hpcclear.scene.contacts.declared import ContactGeometry, Get, Number, Shape
-from hpcclear.scene.fields import NOWHERE, Position, PositiveLength, Quantity, invalid
+from hpcclear.scene.fields import NOWHERE, Entries, Position, PositiveLength, Quantity, invalid
 from hpcclear.scene.fits import with_clearance
 from hpcclear.scene.joints import Materials, PlanarRevolute
 from hpcclear.scene.surfaces import Film, OutOfRound, Wear, check_film, check_waves
@@ -44,7 +44,7 @@ class PinInBearing(ContactGeometry):
     """Waviness of its surfaces. Without it they are round."""
 
     @classmethod
-    def _of_file(cls, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _of_file(cls, row: Entries) -> Entries:
         return with_clearance(row)
 
     def _check(self) -> None:

@@ -69,7 +69,9 @@ class Compared:
             if self.traded[best, taken].all():
                 taken.append(best)
         any_less = self.less.any(axis=0)
-        behind = (any_less & ~any_less.T)[self.known].any(axis=0)  # by one that is nowhere worse
+        behind = np.asarray(any_less & ~any_less.T)[self.known].any(
+            axis=0
+        )  # by one that is nowhere worse
         rows = np.flatnonzero(self.known & ~behind)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)
