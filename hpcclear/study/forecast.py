@@ -36,8 +36,8 @@ LEAST = 5
 """Simulations per input that a pilot needs."""
 
 REHEARSALS = 3
-"""Rehearsals, each of a pilot and a seed of its own, as far as pilots stay within `LONGEST`: one is as far off by chance as a
-study, a quarter."""
+"""Rehearsals, each of a pilot and a seed of its own, as far as pilots stay within `LONGEST`: one alone scatters as
+much as a study does."""
 
 DESIGNS, LENGTH = 4, 8
 """Designs, and points of each of their replicates, that show how much scatter a surrogate leaves."""

@@ -2,7 +2,7 @@
 
 A step's sliding work is known to the order of its method. It is booked at one angle, that between the directions of the
 contact at both ends, each weighted by the sliding power there: within a step the angle hardly changes, and what is made of it
-is off by the square of that change. GoalValue at every stage, as all else is integrated, it would cost as much as the motion.
+is off by the square of that change. Taken at every stage, as all else is integrated, it would cost as much as the motion.
 
 It is compiled for the joints and waves there are, and steppers call it by its address after a step.
 """
