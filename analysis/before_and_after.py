@@ -1,14 +1,15 @@
 """Is this checkout slower than an earlier commit? Ensembles of several scenes, or the starts of commands; both sources in turn,
 ratios pair by pair.
 
-    python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about ten minutes
-    python analysis/before_and_after.py 1386e2f --pairs 15 --designs 512
+    python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about eight minutes
+    python analysis/before_and_after.py 1386e2f --pairs 15 --designs 2048
     python analysis/before_and_after.py 1386e2f --record        # writes results/before_and_after.csv beside this file
     python analysis/before_and_after.py 063ea1e --starts        # commands that compute little, two minutes; results/starts.csv
 
-Each source has one process, which compiles first and is not timed then; processor time of `evaluate` counts. Of a command its
-own process counts, after one that fills the caches of bytecode and of compiled code. A line says the median of the ratios, new
-over old, and their lower and upper quarter.
+A pair is two new processes, one of each source, of `TURNS` calls of `evaluate` each, by turns; the least processor time counts.
+Where its memory lies makes one process as much as a tenth slower than another of the same code. Of a command its own process
+counts, after one that fills the caches of bytecode and of compiled code. A line says the median of the ratios, new over old,
+and their lower and upper quarter.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from same_bytes import ROOT, sources
@@ -49,6 +51,8 @@ STARTS = {
     "--help": ("--help",),
 }
 """Commands, in a folder with a response."""
+
+TURNS = 7
 
 LOAD = ["effects.slider_load=[[0, -2000], [1.5, -300], [3.1, 0], [5.5, -300]]"]
 
@@ -80,12 +84,25 @@ class Worker:
             env=os.environ | {"PYTHONPATH": str(root)},
         )
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.communicate()
+
     def seconds(self, case: str) -> float:
         """Processor time of one ensemble."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         print(case, file=self._process.stdin, flush=True)
         return float(self._process.stdout.readline())
+
+
+def pair(before: Path, case: str, designs: int) -> tuple[float, ...]:
+    """The least processor times of an ensemble in two new processes, old and new; the first call compiles."""
+    with Worker(before, designs) as old, Worker(ROOT, designs) as new:
+        turns = [(old.seconds(case), new.seconds(case)) for _ in range(TURNS + 1)]
+    return tuple(np.min(turns[1:], axis=0))
 
 
 class Starts:
@@ -114,7 +131,7 @@ def main() -> None:
     )
     parser.add_argument("commit", nargs="?")
     parser.add_argument("--pairs", type=int, default=7)
-    parser.add_argument("--designs", type=int, default=256)
+    parser.add_argument("--designs", type=int, default=512)
     parser.add_argument("--only", help="cases whose names contain this")
     parser.add_argument("--record", action="store_true", help=f"write {RESULTS.name}")
     parser.add_argument("--starts", action="store_true", help="processor time of commands instead")
@@ -126,22 +143,26 @@ def main() -> None:
         before = sources(words.commit, Path(place) / "before")
         if words.starts:
             old, new = Starts(before, Path(place) / "old"), Starts(ROOT, Path(place) / "new")
-        else:
-            old, new = Worker(before, words.designs), Worker(ROOT, words.designs)
         rows, run = [HEAD], [words.commit or "HEAD", processor(), f"{datetime.date.today()}"]
         print(f"{'scene':24s} {'before, s':>10s} {'ratio':>7s} {'quarters':>14s}")
+
+        def measured(case: str) -> tuple[float, ...]:
+            if words.starts:
+                return old.seconds(case), new.seconds(case)
+            return pair(before, case, words.designs)
+
         for case in (
             one for one in (STARTS if words.starts else CASES) if (words.only or "") in one
         ):
-            old.seconds(case), new.seconds(case)  # compile
-            pairs = [(old.seconds(case), new.seconds(case)) for _ in range(words.pairs)]
-            before, after = np.array(pairs).T
-            low, middle, high = np.quantile(after / before, (0.25, 0.5, 0.75))
+            measured(case)  # fills the caches
+            pairs = [measured(case) for _ in range(words.pairs)]
+            old_s, new_s = np.array(pairs).T
+            low, middle, high = np.quantile(new_s / old_s, (0.25, 0.5, 0.75))
             print(
-                f"{case:24s} {np.median(before):10.3f} {middle:7.3f} {low:7.3f}-{high:.3f}",
+                f"{case:24s} {np.median(old_s):10.3f} {middle:7.3f} {low:7.3f}-{high:.3f}",
                 flush=True,
             )
-            found = [f"{np.median(before):.3f}", *(f"{x:.3f}" for x in (middle, low, high))]
+            found = [f"{np.median(old_s):.3f}", *(f"{x:.3f}" for x in (middle, low, high))]
             rows.append([case, f"{words.pairs}", *found, *run])
     if words.record:
         with (RESULTS.with_name("starts.csv") if words.starts else RESULTS).open(

@@ -23,6 +23,10 @@ _FOLDED = (len, int, float, min, max, abs, range, written_out)
 """What is called at once, if its arguments are known."""
 
 
+_AT_HAND = (ast.Name, ast.Constant)
+"""Expressions that take no instruction."""
+
+
 class Expressions(Arithmetic):
     """Expressions of one function; `hpcclear.base.lowering.statements.Function` has the rest of it."""
 
@@ -97,11 +101,22 @@ class Expressions(Arithmetic):
         return link(0)
 
     def _of_IfExp(self, node: ast.IfExp) -> Value:
+        test = self.truth(self.expression(node.test))
+        if not val.is_known(test) and all(
+            isinstance(one, _AT_HAND) for one in (node.body, node.orelse)
+        ):
+            chosen = [self.expression(one) for one in (node.body, node.orelse)]
+            if all(isinstance(one, float | int | ir.Value) for one in chosen):
+                return self.selected(test, *chosen)
         return self.either(
-            self.truth(self.expression(node.test)),
-            lambda: self.expression(node.body),
-            lambda: self.expression(node.orelse),
+            test, lambda: self.expression(node.body), lambda: self.expression(node.orelse)
         )
+
+    def selected(self, test: Value, yes: Value, no: Value) -> Value:
+        """One of two numbers at hand. A branch the compiler may move their loads into, and then it vectorises no loop around it."""
+        yes, no = self.value(yes), self.value(no)
+        kind = val.wider(yes.type, no.type)
+        return self.builder.select(test, self.cast(yes, kind), self.cast(no, kind))
 
     def either(self, test: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """The value of one of two branches; of the one that is taken, where that is known."""

@@ -111,7 +111,7 @@ def step_error(effects, step, stages, W):
         for i in range(step.lanes):
             work[at.ERROR * W + i] += gap_error(step, p, i, W)
     coordinate_errors(step, stages, W)
-    for i in range(W):
+    for i in range(step.lanes):
         work[at.ERROR * W + i] *= (0.5 / n) * work[at.STRICTER * W + i]
 
 

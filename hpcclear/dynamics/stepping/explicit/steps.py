@@ -180,7 +180,7 @@ def take_explicit_steps(effects, observing, motion, step, tables, senses, stages
         else:
             any_stage_state(step, s, stages, W)
         c = weights[tab.NODES + s]
-        for i in range(W):
+        for i in range(step.lanes):
             work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
         run_observed(observing, motion, work, tables)
         if s == 0:
