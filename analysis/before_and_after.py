@@ -1,7 +1,7 @@
 """Is this checkout slower than an earlier commit? Ensembles of several scenes, or the starts of commands; both sources in turn,
 ratios pair by pair.
 
-    python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about eight minutes
+    python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, eleven minutes
     python analysis/before_and_after.py 1386e2f --pairs 15 --designs 2048
     python analysis/before_and_after.py 1386e2f --record        # writes results/before_and_after.csv beside this file
     python analysis/before_and_after.py 063ea1e --starts        # commands that compute little, two minutes; results/starts.csv
@@ -52,7 +52,7 @@ STARTS = {
 }
 """Commands, in a folder with a response."""
 
-TURNS = 7
+TURNS = 5
 
 LOAD = ["effects.slider_load=[[0, -2000], [1.5, -300], [3.1, 0], [5.5, -300]]"]
 
@@ -131,7 +131,7 @@ def main() -> None:
     )
     parser.add_argument("commit", nargs="?")
     parser.add_argument("--pairs", type=int, default=7)
-    parser.add_argument("--designs", type=int, default=512)
+    parser.add_argument("--designs", type=int, default=256)
     parser.add_argument("--only", help="cases whose names contain this")
     parser.add_argument("--record", action="store_true", help=f"write {RESULTS.name}")
     parser.add_argument("--starts", action="store_true", help="processor time of commands instead")

@@ -113,7 +113,7 @@ class Expressions(Arithmetic):
         )
 
     def selected(self, test: Value, yes: Value, no: Value) -> Value:
-        """One of two numbers at hand. A branch the compiler may move their loads into, and then it vectorises no loop around it."""
+        """One of two numbers at hand. Into a branch the compiler may move their loads, and vectorises no loop around it."""
         yes, no = self.value(yes), self.value(no)
         kind = val.wider(yes.type, no.type)
         return self.builder.select(test, self.cast(yes, kind), self.cast(no, kind))
