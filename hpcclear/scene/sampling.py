@@ -4,7 +4,6 @@ Every number follows from the study's seed, a purpose ("train", "test", ...) and
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
 """
 
-from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -224,21 +223,15 @@ class MonteCarloPoints:
 
     def __init__(self, scene: Scene, total: int) -> None:
         self._scene, self._total = scene, total
-        self._pages: OrderedDict[int, Points] = OrderedDict()
+        self.page = lru_cache(_PAGES)(self._page)
 
     def __len__(self) -> int:
         return self._total
 
-    def page(self, number: int) -> Points:
+    def _page(self, number: int) -> Points:
         """Points `number` * 4096 and on, at most 4096 of them."""
-        if number not in self._pages:
-            first = number * _PAGE
-            count = min(_PAGE, self._total - first)
-            self._pages[number] = monte_carlo(self._scene, count, first=first)
-            if len(self._pages) > _PAGES:
-                self._pages.popitem(last=False)
-        self._pages.move_to_end(number)
-        return self._pages[number]
+        first = number * _PAGE
+        return monte_carlo(self._scene, min(_PAGE, self._total - first), first=first)
 
     def __getitem__(self, index: Integers) -> Array:
         index = np.asarray(index, np.int64)

@@ -2,8 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -203,23 +203,17 @@ class StudyTables(Table):
                     name, entry = input_entry(path)
                     if name == row.name:
                         entries[entry] = value
-        found = self._changed(row, entries) if entries else row.law
+        found = self._changed(row.name, tuple(entries.items())) if entries else row.law
         if row.relative and row.name in design:
             return quantiles.Scaled(found, abs(float(design[row.name])))
         return found
 
     @cached_property
-    def _made(self) -> dict[tuple[object, ...], quantiles.Quantiles]:
-        """Distributions that were made: those of fits are tables."""
-        return {}
-
-    def _changed(self, row: RandomInput, entries: Mapping[str, object]) -> quantiles.Quantiles:
-        key = (row.name, *entries.items())
-        if key not in self._made:
-            if len(self._made) >= MOST_EXTREMES:
-                self._made.clear()
-            self._made[key] = row.changed(entries)
-        return self._made[key]
+    def _changed(self) -> Callable[[str, tuple[tuple[str, object], ...]], quantiles.Quantiles]:
+        """Makes a random input's distribution with other entries, and keeps it: those of fits are tables."""
+        return lru_cache(MOST_EXTREMES)(
+            lambda name, entries: self.random_input(name).changed(dict(entries))
+        )
 
     def reach(self, row: RandomInput) -> Range:
         """Least and largest value that counts of a random input, over all designs; of the difference from the design at the
