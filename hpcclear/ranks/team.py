@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
@@ -40,7 +39,7 @@ class Ranks:
         self._stage = "start"
         self.queue: WorkQueue | None = None
         self._unsent: list[np.ndarray] = []
-        self._writing = Stopwatch()  # output not booked yet
+        self._writing = 0.0  # seconds of output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
         self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (`WorkQueue`)
@@ -82,9 +81,14 @@ class Ranks:
         """Name what root does inside, for error reports and `stage_seconds`."""
         return self.timed(name, serial=True)
 
-    def writing(self) -> contextlib.AbstractContextManager[None]:
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
         """Count root's time inside as output of the stage under way."""
-        return self._writing.running()
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._writing += time.perf_counter() - started
 
     def everywhere(self, name: str, function: Call, payload: object) -> None:
         """Call `function(payload, ranks)` of a module once on every rank, and wait until all have returned; on root.
@@ -119,16 +123,16 @@ class Ranks:
         """Book the wall time inside, less what is booked inside; yields the table to fill."""
         spent = np.zeros((self.size, len(COLUMNS)))
         outer, self._stage = self._stage, name
-        writing, self._writing = self._writing, Stopwatch()
+        writing, self._writing = self._writing, 0.0
         started, booked = time.perf_counter(), self._booked
         try:
             yield spent
             self._stage = outer  # not after an error: its report names the stage
         finally:
             wall = time.perf_counter() - started - (self._booked - booked)
-            spent[0, COLUMNS.index("write")] = self._writing.seconds
+            spent[0, COLUMNS.index("write")] = self._writing
             if serial:
-                spent[0, COLUMNS.index("busy")] = wall - self._writing.seconds
+                spent[0, COLUMNS.index("busy")] = wall - self._writing
             spent[:, COLUMNS.index("idle")] = np.maximum(wall - spent.sum(axis=1), 0.0)
             self.stage_seconds[name] = self.stage_seconds.get(name, 0.0) + spent
             self._booked += wall

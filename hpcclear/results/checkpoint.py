@@ -9,7 +9,7 @@ files of plain arrays. Every file carries the key of its run, and only the same 
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError, refused
 from hpcclear.base.outcome import JOINTS, OUTCOME, recast
-from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.keys import check_key, key_attribute
@@ -90,7 +89,6 @@ class Checkpoint:
     def __init__(
         self, directory: Path, key: Mapping[str, str], *, interval: float = INTERVAL, units: Mapping[str, str] | None = None,
         attributes: Mapping[str, object] | None = None, joints: Sequence[str] = JOINTS, record: np.dtype = OUTCOME,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:  # fmt: skip
         self.directory = directory
         self.key = dict(key)
@@ -98,22 +96,14 @@ class Checkpoint:
         self.units = dict(units or {})
         self.joints, self.record = tuple(joints), record
         self.attributes = {**(attributes or {}), **key_attribute(key)}
-        self._watch = Stopwatch()
         self.problems: list[str] = []
-        self._clock = clock
         self._parts: list[_Part] = []
         self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
         try:
-            with self._watch.running():
-                self._number = self._open()
+            self._number = self._open()
         except OSError as error:
             raise refused(directory, error) from None
-        self._written = clock()
-
-    @property
-    def seconds(self) -> float:
-        """Time spent in this class."""
-        return self._watch.seconds
+        self._written = time.monotonic()
 
     # -- samples --------------------------------------------------------------------------------
 
@@ -131,7 +121,7 @@ class Checkpoint:
 
     def flush_when_due(self) -> None:
         """Write what has gathered when the interval is over; raises as `flush`."""
-        if self._clock() - self._written >= self.interval:
+        if time.monotonic() - self._written >= self.interval:
             self.flush()
 
     def flush(self) -> None:
@@ -139,15 +129,12 @@ class Checkpoint:
 
         Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory, and a later call tries again.
         """
-        if not self._buffer:
-            self._written = self._clock()
-            return
-        with self._watch.running():
+        if self._buffer:
             records, values = zip(*self._buffer, strict=True)
             self._write_part(0, np.concatenate(records), np.concatenate(values))
             self._buffer.clear()
             self._merge()
-        self._written = self._clock()
+        self._written = time.monotonic()
 
     def completed(self, first: int = 0, count: int | None = None) -> np.ndarray:
         """Samples on disk and in memory, by growing number, each once; shape (n,): all, or those of `count` from `first` on."""
@@ -214,30 +201,28 @@ class Checkpoint:
 
         `name`: of letters, digits, ``_`` and ``-``.
         """
-        with self._watch.running():
-            variables = {key: _stage_variable(key, values) for key, values in data.items()}
-            content = Results(variables, {**self.attributes, "stage": name})
-            netcdf.save(content, self._stage_path(name))
+        variables = {key: _stage_variable(key, values) for key, values in data.items()}
+        content = Results(variables, {**self.attributes, "stage": name})
+        netcdf.save(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
         """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
 
         Raises InputError: the file is another run's.
         """
-        with self._watch.running():
-            path = self._stage_path(name)
-            if not path.exists():
-                return None
-            try:
-                content = netcdf.load(path)
-            except InputError as error:
-                self.problems.append(f"{path.name} is done again: {error.reason}")
-                return None
-            check_key(content, self.key, path)
-            return {
-                key: one.values.astype(bool) if "truth" in one.attrs else one.values
-                for key, one in content.variables.items()
-            }
+        path = self._stage_path(name)
+        if not path.exists():
+            return None
+        try:
+            content = netcdf.load(path)
+        except InputError as error:
+            self.problems.append(f"{path.name} is done again: {error.reason}")
+            return None
+        check_key(content, self.key, path)
+        return {
+            key: one.values.astype(bool) if "truth" in one.attrs else one.values
+            for key, one in content.variables.items()
+        }
 
     def _stage_path(self, name: str) -> Path:
         path = self.directory / f"stage-{name}.nc"
@@ -249,11 +234,10 @@ class Checkpoint:
 
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
-        with self._watch.running():
-            netcdf.save(Results({}, self.attributes), self.directory / _DONE)
-            discard(self.directory)
-            self._parts.clear()
-            self._buffer.clear()
+        netcdf.save(Results({}, self.attributes), self.directory / _DONE)
+        discard(self.directory)
+        self._parts.clear()
+        self._buffer.clear()
 
     def _open(self) -> int:
         """Read the parts that are there; the number of the next one."""
