@@ -3,13 +3,12 @@
 import math
 
 from hpcclear.laws.declared import FrictionLaw, Parameter
-from hpcclear.laws.shapes import share
 
 
 def ratio(speed, coefficient, dead_speed, inverse_ramp):
     """Zero up to ``dead_speed`` v0, then a ramp over v1 - v0 = 1/inverse_ramp."""
     ramp = (abs(speed) - dead_speed) * inverse_ramp
-    return math.copysign(coefficient * share(ramp), speed)
+    return math.copysign(coefficient * max(min(ramp, 1.0), 0.0), speed)
 
 
 def low(speed, dead_speed, inverse_ramp):

@@ -1,12 +1,11 @@
 """Coulomb's friction with a ramp about rest."""
 
 from hpcclear.laws.declared import FrictionLaw, Parameter
-from hpcclear.laws.shapes import clipped
 
 
 def ratio(speed, coefficient, inverse_ramp):
     """A linear ramp, full at ``|v| = 1/inverse_ramp``."""
-    return coefficient * clipped(speed * inverse_ramp)
+    return coefficient * max(min(speed * inverse_ramp, 1.0), -1.0)
 
 
 def low(speed, inverse_ramp):
