@@ -72,8 +72,7 @@ FEATURES = {
         "statistics/streams.py ensemble/statistics.py ensemble/split.py "
         "scene/sampling.py",
     "killed runs, lost ranks, damaged files":
-        "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "
-        "results/places.py",
+        "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py",
     "surrogates beside Kriging":
         "statistics/surrogate/regression.py statistics/surrogate/leaf.py statistics/surrogate/piecewise.py "
         "statistics/surrogate/response_surface.py statistics/surrogate/surface_search.py "

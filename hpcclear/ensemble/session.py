@@ -29,7 +29,6 @@ from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, discard, unfinished
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key, key_attribute, key_of
-from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.scene import record_of
@@ -85,13 +84,13 @@ class Place:
         """
         if not (fresh and output.is_file()):  # which stays as it is
             files.refuse_foreign(output, netcdf.SEAL)
-        if fresh and any(os.path.lexists(path) for path in (output, parts_of(output))):
-            output = fresh_sibling(output)
+        if fresh and any(os.path.lexists(path) for path in (output, _parts_of(output))):
+            output = _fresh_sibling(output)
         files.probe(output, netcdf.SEAL)
         parent, timing = output.parent, output.with_name(f"{output.stem}.timing.nc")
         files.refuse_foreign(timing, netcdf.SEAL)
         lock = parent / f".{output.name}.lock"
-        return cls(output, parts_of(output), timing, lock, (parent,))
+        return cls(output, _parts_of(output), timing, lock, (parent,))
 
     @classmethod
     def of_response(cls, output: Path) -> Self:
@@ -113,7 +112,7 @@ class Place:
         """
         try:
             if fresh and directory.exists() and any(directory.iterdir()):
-                directory = fresh_sibling(directory)
+                directory = _fresh_sibling(directory)
             directory.mkdir(exist_ok=True)
         except OSError as error:
             raise refused(directory, error) from None
@@ -156,6 +155,35 @@ class Place:
                 continue
             if key_of(content):
                 check_key(content, key, path)
+
+
+def _parts_of(output: Path) -> Path:
+    """Where the finished samples of a single result file are kept until it is written."""
+    return output.with_name(f".{output.name}.parts")
+
+
+def _fresh_sibling(path: Path) -> Path:
+    """The first free name beside `path`: DIR-2, DIR-3, ... or OUT-2.nc, OUT-3.nc, ...
+
+    A directory is made at once, so that two runs never get the same one; for a file (a name with
+    a suffix) the lock of the run decides.
+    """
+    path = path.absolute()  # "." has no name
+    number = 2
+    while True:
+        sibling = path.with_name(f"{path.stem}-{number}{path.suffix}")
+        if path.is_dir() or path.suffix == "":
+            sibling = path.with_name(f"{path.name}-{number}")
+            try:
+                sibling.mkdir()
+                return sibling
+            except FileExistsError:
+                pass
+            except OSError as error:
+                raise refused(sibling, error) from None
+        elif not any(os.path.lexists(place) for place in (sibling, _parts_of(sibling))):
+            return sibling
+        number += 1
 
 
 def _occupied(folder: Path, key: Mapping[str, str]) -> str:
