@@ -187,7 +187,7 @@ def spectra_of(places: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def made(scene):
     """An ensemble by formula, and its preparation for a sensor with noise."""
     whole = Inputs.of(scene, [UNKNOWN])
-    inputs = Inputs(whole.unknowns, whole.nuisances[:1])
+    inputs = Inputs(scene, whole.unknowns, whole.random[:1])
     places = design(1, inputs, 128)
     spectra = spectra_of(places, np.random.default_rng(2))
     ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
@@ -237,7 +237,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     both = scene.with_({"joints.rod_slider": pin})
     other = UNKNOWN.replace("crank_rod", "rod_slider")
     whole = Inputs.of(both, [UNKNOWN, other])
-    inputs = Inputs(whole.unknowns)
+    inputs = Inputs(both, whole.unknowns, ())
     places = design(1, inputs, 128)
     total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
     spectra = spectra_of(total, np.random.default_rng(2))

@@ -7,15 +7,14 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.quantiles import Quantiles
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import Sensor
 from hpcclear.scene import Scene
-from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.random_inputs import RandomInput
+from hpcclear.scene.sampling import offsets
 from hpcclear.scene.streams import generator, sobol
 
 
@@ -50,32 +49,16 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Nuisance:
-    """A random input of the scene that is not known either."""
-
-    name: str
-    paths: tuple[str, ...]
-    law: Quantiles
-    centre: float
-    """What its law is added to; 0 where it gives values."""
-
-    @classmethod
-    def of(cls, scene: Scene, row: RandomInput) -> "Nuisance":
-        """Return that of a random input."""
-        centre = 0.0 if row.absolute else scene.number(row.paths[0])
-        return cls(row.name, row.paths, row.law, centre)
-
-
-@dataclass(frozen=True)
 class Inputs:
     """All that is not known: coordinates of a point of the unit cube are probabilities.
 
-    The last two are calibration errors of the sensor, where it has some.
+    `random`: inputs of the scene's study that are not known either. The last two coordinates are calibration errors of the
+    sensor, where it has some.
     """
 
+    scene: Scene = field(repr=False)
     unknowns: tuple[Unknown, ...]
-    nuisances: tuple[Nuisance, ...] = ()
-    correlation: Correlation | None = field(default=None, repr=False)
+    random: tuple[RandomInput, ...]
 
     @classmethod
     def of(cls, scene: Scene, unknowns: Sequence[str]) -> "Inputs":
@@ -91,10 +74,8 @@ class Inputs:
         if len(set(taken)) < len(taken):
             listed = ", ".join(unknowns)
             raise InputError("--unknown", listed, "two drive the same entry", "Drop one")
-        study = scene.study
-        rows = () if study is None else study.random
-        kept = tuple(Nuisance.of(scene, row) for row in rows if not set(row.paths) & set(taken))
-        made = cls(own, kept, None if study is None else study.correlation)
+        rows = () if scene.study is None else scene.study.random
+        made = cls(scene, own, tuple(row for row in rows if not set(row.paths) & set(taken)))
         plain = scene.with_({"study": None})
         corners = np.full((3, made.size), 0.5)  # all at their medians; unknowns at their bounds
         corners[1:, : len(own)] = [[0.0], [1.0]]
@@ -104,12 +85,12 @@ class Inputs:
     @property
     def size(self) -> int:
         """Number of inputs of the mechanism."""
-        return len(self.unknowns) + len(self.nuisances)
+        return len(self.unknowns) + len(self.random)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the inputs."""
-        return (*(one.name for one in self.unknowns), *(one.name for one in self.nuisances))
+        return (*(one.name for one in self.unknowns), *(one.name for one in self.random))
 
     def values(self, places: Array) -> Array:
         """Return the inputs (n, size), SI, at places (n, size or more) of the unit cube."""
@@ -117,14 +98,14 @@ class Inputs:
         lower, upper = np.array([(one.lower, one.upper) for one in self.unknowns]).T
         own = lower + places[:, :count] * (upper - lower)
         chances = [np.clip(column, 1e-9, 1.0 - 1e-9) for column in places[:, count : self.size].T]
-        if self.correlation is not None:
-            chances = self.correlation.together([one.name for one in self.nuisances], chances)
-        drawn = zip(self.nuisances, chances, strict=True)
-        return np.column_stack([own, *(one.centre + one.law(chance) for one, chance in drawn)])
+        names = [one.name for one in self.random]
+        drawn = offsets(self.scene, names, chances).values() if names else ()
+        centres = [0.0 if o.absolute else self.scene.number(o.paths[0]) for o in self.random]
+        return np.column_stack([own, *map(np.add, centres, drawn)])
 
     def points(self, places: Array) -> Points:
         """Return the designs at places (n, size or more)."""
-        paths = (*(one.paths for one in self.unknowns), *(one.paths for one in self.nuisances))
+        paths = (*(one.paths for one in self.unknowns), *(one.paths for one in self.random))
         return Points(self.names, self.values(places), paths)
 
     def variants(self, places: Array) -> list[dict[str, float]]:
