@@ -237,7 +237,7 @@ def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monke
 
 @functools.cache
 def sealed() -> bytes:
-    image = netcdf.encode(Results.of(samples()))
+    image = netcdf.encode(Results.of(samples())).getvalue()
     return image + netcdf.seal(image)
 
 

@@ -70,7 +70,7 @@ def test_formulas_of_laws_have_the_value_of_an_evaluation_beside(count):
         text, value = formulas.formula(rng, NAMES, rng.randint(1, 4), True)
         expected = by_hand(value)
         try:
-            law = law_of("friction", text, UNITS)
+            law = law_of("friction", text, tuple(UNITS.items()))
         except FormulaError as error:
             ended[error.reason.partition(":")[0]] += 1
             continue

@@ -26,34 +26,29 @@ from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 def compile_share(payload: Payload, ranks: Ranks) -> None:
     """Compile this rank's share of the parts; root and the others are at it together."""
-    mine: tuple[Callable[[Payload], None], ...] = (_ensemble, _response, _statistics)
+    scene = payload.scene
+    mine: tuple[Callable[[], object], ...] = (
+        lambda: Evaluator(scene, payload.columns, payload.lanes).advance(0.0),  # of many samples
+        lambda: simulated(scene.with_(SHORTEST)),  # of one response
+        lambda: _statistics(scene),
+    )
     if ranks.size > 1 and ranks.is_root:
         # the first takes as long as the others together; then the second is there to load
         mine = mine[:2]
     elif ranks.size > 1:
         mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
     for part in mine:
-        part(payload)
+        part()
 
 
-def _ensemble(payload: Payload) -> None:
-    """The kernel for many samples."""
-    Evaluator(payload.scene, payload.columns, payload.lanes).advance(0.0)
-
-
-def _response(payload: Payload) -> None:
-    """The kernel for one response."""
-    simulated(payload.scene.with_(SHORTEST))
-
-
-def _statistics(payload: Payload) -> None:
+def _statistics(scene: Scene) -> None:
     """Surrogate, its moments, and the swarm."""
     rng = np.random.default_rng(0)
     points = rng.random((12, 2))
     bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
     model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
     model.predict(points)
-    study = payload.scene.study
+    study = scene.study
     if study is not None and study.surrogate.kernel not in (None, model.kernel):
         replace(model, kernel=study.surrogate.kernel).predict(points)
     objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.5, 0.5))])

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
-from hpcclear.ensemble.maps import grid, number_of, run_map
+from hpcclear.ensemble.maps import number_of, run_map
 from hpcclear.ensemble.session import Finished, Options
 from hpcclear.ensemble.wear import run_wear
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style
+from hpcclear.results.grids import grid
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:

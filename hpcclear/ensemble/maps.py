@@ -15,11 +15,9 @@ from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.content import Results
-from hpcclear.results.grids import SHAPE, grid
+from hpcclear.results.grids import SHAPE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
-
-__all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
 
 if TYPE_CHECKING:
     from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
@@ -105,7 +103,7 @@ def run_map(
 ) -> Finished:  # fmt: skip
     """Judge every cell of a grid of one or two axes (``PATH=LO:HI:N``) on all ranks and write it, a sample a cell; on root.
 
-    `grid` gives the file back as a grid. Raises InputError, StorageError, Stopped, RankFailed.
+    `hpcclear.results.grids.grid` gives the file back as a grid. Raises InputError, StorageError, Stopped, RankFailed.
     """
     place = Place.of_file(output, options.fresh)
     points, shape = cells(scene, axes)

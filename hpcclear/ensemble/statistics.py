@@ -76,8 +76,10 @@ def run_statistics(
     key = statistics_key(scene, len(points))
     with Session(place, key, ranks, options) as session, _keeping(raw, session) as folder:
         content = session.found("statistics")
-        if content is not None and folder is not None:
-            _refuse_unkept(folder, len(points), place.output)
+        blocks = range(-(-len(points) // BLOCK))
+        if content is not None and folder is not None and (gone := _missing(folder, blocks)):
+            reason = f"the statistics exist, in {place.output}, but the samples were not kept ({gone[0]} is missing)"
+            raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
         if content is None:
             content = _Streaming(scene, points, session, folder).run()
         session.close()
@@ -108,14 +110,6 @@ def _kept(folder: Path, number: int) -> Path:
 def _missing(folder: Path, blocks: Iterable[int]) -> list[str]:
     """Names of the files of some blocks that are not in a directory."""
     return [path.name for number in blocks if not (path := _kept(folder, number)).is_file()]
-
-
-def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
-    """Raise InputError where statistics are finished and samples of theirs are not in a directory."""
-    missing = _missing(folder, range(-(-samples // BLOCK)))
-    if missing:
-        reason = f"the statistics exist, in {output}, but the samples were not kept ({missing[0]} is missing)"
-        raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
 
 
 class _Streaming:

@@ -22,13 +22,9 @@ SHORT = {
 """Short names that a formula may use, by the kind of law, for what they stand for."""
 
 
-def law_of(kind: str, formula: str, units: Mapping[str, str]) -> Law:
-    """The law of a formula, whose parameters have these units. Raises LawError if it is none."""
-    return _made(kind, formula, tuple(units.items()))
-
-
 @lru_cache(maxsize=64)
-def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
+def law_of(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
+    """The law of a formula; `units`: its parameters, each with its unit. Raises LawError if it is none."""
     short = SHORT[kind]
     parameters = tuple(Parameter(name, unit, "a parameter of the formula") for name, unit in units)
     entry = "force" if kind == "contact" else "ratio"

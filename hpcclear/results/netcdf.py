@@ -76,7 +76,7 @@ def seal(content: Buffer) -> bytes:
 
 def save(content: Results, path: Path) -> None:
     """Write content as a sealed NetCDF-4 file (see `write_bytes`, `encode`)."""
-    image = _image(content)
+    image = encode(content)
     with image.getbuffer() as written:
         ending = seal(written)
     image.seek(0, io.SEEK_END)
@@ -97,18 +97,13 @@ def load(path: Path) -> Results:
         raise InputError("file", str(path), reason, "Name a file that hpcclear wrote") from None
 
 
-def encode(content: Results) -> bytes:
-    """Results as the bytes of a NetCDF-4 file; equal content gives equal bytes.
+def encode(content: Results) -> io.BytesIO:
+    """Results as a NetCDF-4 file, in the memory it was built in; equal content gives equal bytes.
 
     Variables are numbers or text; coordinates are one-dimensional and named as their dimension. Floating-point data variables
     carry ``_FillValue = NaN``, coordinates and integers carry none. Raises ValueError: a type or a coordinate that the file
     cannot hold.
     """
-    return _image(content).getvalue()
-
-
-def _image(content: Results) -> io.BytesIO:
-    """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", track_order=True) as file:
         for number, name in enumerate(content.sizes):

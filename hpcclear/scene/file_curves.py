@@ -15,7 +15,7 @@ from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, Tables, invalid
-from hpcclear.scene.paths import curves, files_named, replace
+from hpcclear.scene.paths import curve_at, curves, files_named, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 from hpcclear.scene.validation import validated
 
@@ -270,18 +270,16 @@ def _with_values(row: Tables, file: str, key: str, folder: Path) -> tuple[Tables
 
 
 def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
-    parts = key.split(".")
-    general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
-    if general not in curves():
+    pairs = curve_at(key)
+    if pairs is None:
         listed = ", ".join(curves()).replace("*", "NAME")
         remedy = f"Files stand in study.random.NAME, {listed}"
         raise InputError(f"{key}.file", row["file"], "no file is read here", remedy)
     with at(key):
         curve = validated(FileCurve, row)
-    unit = curves()[general].unit
-    if curves()[general].x == "s":
-        return against_time(curve, folder, unit, key)
-    return pairs_of(curve, folder, unit, key, _turns(content))
+    if pairs.x == "s":
+        return against_time(curve, folder, pairs.unit, key)
+    return pairs_of(curve, folder, pairs.unit, key, _turns(content))
 
 
 def _turns(content: Tables) -> int:

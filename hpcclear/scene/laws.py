@@ -178,7 +178,7 @@ class LawTable(Table):
         if not (isinstance(units, Mapping) and {*map(type, units.values())} <= {str}):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with at(entry):
-            law = law_of(cls.kind, text, units)
+            law = law_of(cls.kind, text, tuple(units.items()))
         with at("units"):
             check_parameters(law)
         return law
