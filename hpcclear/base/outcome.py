@@ -5,7 +5,7 @@ A failed simulation is an outcome, not an exception: its numbers are NaN and its
 
 from collections.abc import Callable, Collection
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -23,76 +23,71 @@ WAVE_ROWS = 32
 
 
 class Status(IntEnum):
-    """Outcome of one simulation. Numbers are NaN unless it is `valid`."""
+    """Outcome of one simulation. Numbers are NaN unless it is `valid`.
 
-    OK = 0
-    STEP_CAP = 1
-    STEP_TOO_SMALL = 2
-    NOT_FINITE = 3
-    STALLED = 4
-    NEAR_SINGULAR = 6
-    WORN_THROUGH = 7
-    JUMP_TOO_SHORT = 8
-    CANNOT_TURN = 9
-    TORN_THROUGH = 10
+    `message`: what happened, `remedy`: what to change, a sentence each.
+    """
+
+    message: str
+    remedy: str
+
+    def __new__(cls, code: int, message: str = "", remedy: str = "") -> Self:
+        """A code and its words."""
+        one = int.__new__(cls, code)
+        one._value_, one.message, one.remedy = code, message, remedy
+        return one
+
+    OK = 0, "finished", "nothing to do"
+    STEP_CAP = (
+        1,
+        "numerics.max_steps was reached before the last revolution ended",
+        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
+        "if all are correct, raise numerics.max_steps",
+    )
+    STEP_TOO_SMALL = (
+        2,
+        "the step size fell below the resolution of the time",
+        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range, or a bar bends too far",
+    )
+    NOT_FINITE = (
+        3, "the state became infinite or undefined", "check masses, stiffness and clearance of this sample"
+    )  # fmt: skip
+    STALLED = (
+        4,
+        "the crank stopped before the requested revolutions were complete",
+        "raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
+    )
+    NEAR_SINGULAR = (
+        6,
+        "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "
+        "or the motion is not determined",
+        'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
+    )
+    WORN_THROUGH = (
+        7,
+        "a clearance has grown to a quarter of its bearing's radius, so the bearing is worn through",
+        "give wear.limit a threshold that ends a service life earlier, or check wear coefficients and lengths of bearings",
+    )
+    JUMP_TOO_SHORT = (
+        8,
+        "no extrapolation jump over the averaged revolutions meets wear.tolerance",
+        "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
+    )
+    CANNOT_TURN = (
+        9,
+        "the linkage cannot turn: without clearance it locks within a turn of its drives, or cannot be assembled",
+        "change lengths, points or angles so that it turns; hpcclear check of this design shows where it locks",
+    )
+    TORN_THROUGH = (
+        10,
+        "a journal penetrated its bearing by more than a quarter of the bearing's radius",
+        "check masses, speed, loads and contact stiffness, and whether the mechanism can move",
+    )
 
     @property
     def valid(self) -> bool:
         """Whether the simulation ran to its end, so that its numbers mean something."""
         return self is Status.OK
-
-    @property
-    def message(self) -> str:
-        """What happened, in one sentence."""
-        return _TEXT[self][0]
-
-    @property
-    def remedy(self) -> str:
-        """What to change, in one sentence."""
-        return _TEXT[self][1]
-
-
-_TEXT = {
-    Status.OK: ("finished", "nothing to do"),
-    Status.STEP_CAP: (
-        "numerics.max_steps was reached before the last revolution ended",
-        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
-        "if all are correct, raise numerics.max_steps",
-    ),
-    Status.STEP_TOO_SMALL: (
-        "the step size fell below the resolution of the time",
-        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range, or a bar bends too far",
-    ),
-    Status.NOT_FINITE: (
-        "the state became infinite or undefined",
-        "check masses, stiffness and clearance of this sample",
-    ),
-    Status.STALLED: (
-        "the crank stopped before the requested revolutions were complete",
-        "raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
-    ),
-    Status.NEAR_SINGULAR: (
-        "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "
-        "or the motion is not determined",
-        'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
-    ),
-    Status.WORN_THROUGH: (
-        "a clearance has grown to a quarter of its bearing's radius, so the bearing is worn through",
-        "give wear.limit a threshold that ends a service life earlier, or check wear coefficients and lengths of bearings",
-    ),
-    Status.JUMP_TOO_SHORT: (
-        "no extrapolation jump over the averaged revolutions meets wear.tolerance",
-        "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
-    ),
-    Status.CANNOT_TURN: (
-        "the linkage cannot turn: without clearance it locks within a turn of its drives, or cannot be assembled",
-        "change lengths, points or angles so that it turns; hpcclear check of this design shows where it locks",
-    ),
-    Status.TORN_THROUGH: (
-        "a journal penetrated its bearing by more than a quarter of the bearing's radius",
-        "check masses, speed, loads and contact stiffness, and whether the mechanism can move",
-    ),
-}
 
 
 class Flag(IntEnum):
@@ -105,29 +100,22 @@ class Flag(IntEnum):
 
 
 class Regime(IntEnum):
-    """What kind of motion a steady mean was looked for in."""
+    """What kind of motion a steady mean was looked for in; `meaning`: what it says about the motion, in a few words."""
 
-    UNJUDGED = 0
-    REGULAR = 1
-    SETTLING = 2
-    UNSTEADY = 3
-    CHAOTIC = 4
-    SEVERAL = 5
+    meaning: str
 
-    @property
-    def meaning(self) -> str:
-        """What it says about the motion, in a few words."""
-        return _REGIMES[self]
+    def __new__(cls, code: int, meaning: str = "") -> Self:
+        """A code and its words."""
+        one = int.__new__(cls, code)
+        one._value_, one.meaning = code, meaning
+        return one
 
-
-_REGIMES = {
-    Regime.UNJUDGED: "not judged",
-    Regime.REGULAR: "regular: the motion repeats itself",
-    Regime.SETTLING: "still settling: the average has not converged",
-    Regime.UNSTEADY: "unsteady: the average drifts, there is no steady mean",
-    Regime.CHAOTIC: "chaotic: the smallest perturbation grows to the size of the motion",
-    Regime.SEVERAL: "several motions: the smallest change of the start decides which one runs",
-}
+    UNJUDGED = 0, "not judged"
+    REGULAR = 1, "regular: the motion repeats itself"
+    SETTLING = 2, "still settling: the average has not converged"
+    UNSTEADY = 3, "unsteady: the average drifts, there is no steady mean"
+    CHAOTIC = 4, "chaotic: the smallest perturbation grows to the size of the motion"
+    SEVERAL = 5, "several motions: the smallest change of the start decides which one runs"
 
 
 class Field(NamedTuple):
