@@ -72,8 +72,8 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
-    """What laws of all kinds declare. Raises TypeError: a function requires an unknown quantity."""
+class Declared:
+    """What laws and geometries declare alike."""
 
     words: str
     """One sentence: what it is."""
@@ -87,13 +87,25 @@ class Law:
     """From parameters and the joint's numbers to a mapping of further numbers, worked out once a sample; or several."""
     numbers: Mapping[str, str] = field(default_factory=dict)
     """Names and units of what `once` gives."""
+    name: str = field(default="", kw_only=True)
+
+    def worked_out(self) -> tuple[Function, ...]:
+        """The functions of ``once``."""
+        if self.once is None:
+            return ()
+        return self.once if isinstance(self.once, tuple) else (self.once,)
+
+
+@dataclass(frozen=True, eq=False)
+class Law(Declared):
+    """What laws of all kinds declare. Raises TypeError: a function requires an unknown quantity."""
+
     check: Function | None = None
     """From the table's values to (reason, remedy, parameter) where they do not fit together, else None."""
     simpler: Function | None = None
     """From the table's values to pairs (words, table): laws that this one may be replaced by, with less effect or less cost."""
     elsewhere: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """Parameters of other laws that a user might write here: reason and remedy."""
-    name: str = ""
 
     kind = ""
 
@@ -102,12 +114,6 @@ class Law:
     def arguments(function: Function) -> tuple[str, ...]:
         """Names of what a function requires."""
         return tuple(signature(function).parameters)
-
-    def worked_out(self) -> tuple[Function, ...]:
-        """The functions of ``once``."""
-        if self.once is None:
-            return ()
-        return self.once if isinstance(self.once, tuple) else (self.once,)
 
     def functions(self) -> dict[str, Function]:
         """Those that run in the lanes, by name."""
@@ -130,19 +136,12 @@ class Law:
         return next((one for one in self.parameters if one.name == name), None)
 
 
-@dataclass(frozen=True, eq=False)
-class Geometry:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Geometry(Declared):
     """The elastic part of a normal force by the shapes that touch; laws that damp by a `ContactLaw.factor` go with any."""
 
-    words: str
     elastic: Function
     """N, of depth."""
-    source: str = ""
-    formula: str = ""
-    valid: str = ""
-    parameters: tuple[Parameter, ...] = ()
-    once: Function | None = None
-    numbers: Mapping[str, str] = field(default_factory=dict)
     energy: Function | None = None
     swing: Function | None = None
     exponent: Function | None = None
@@ -156,7 +155,6 @@ class Geometry:
     """Whether the bearing's length is needed."""
     of_rows: Function | None = None
     """From the rows of a table (depth in m, force in N) in the scene to the geometry that they make; None: it has no table."""
-    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +202,7 @@ class ContactLaw(Law):
             self, geometry=g, elastic=g.elastic, energy=g.energy, swing=g.swing, exponent=g.exponent,
             deepest=g.deepest, parameters=self.parameters + g.parameters,
             numbers={**self.numbers, **g.numbers},
-            once=self.worked_out() + (() if g.once is None else (g.once,)),
+            once=self.worked_out() + g.worked_out(),
         )  # fmt: skip
 
     def afterwards(self) -> list[Function]:
