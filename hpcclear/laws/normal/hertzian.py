@@ -1,8 +1,38 @@
-"""Laws that damp by the coefficient of restitution, F = K d^1.5 (1 + a d'/d'_0): each has a factor a(c_e) of its own."""
+"""Laws whose elastic part is Hertz's: without loss, with a fixed damping factor, or damped by the coefficient of restitution,
+F = K d^1.5 (1 + a d'/d'_0), each with a factor a(c_e) of its own."""
 
-from hpcclear.laws.hertz_contact import by_restitution
+from hpcclear.laws.declared import ContactLaw, Parameter
+from hpcclear.laws.hertz_contact import HERTZIAN, by_restitution
+
+
+def elastic_alone():
+    """Nothing but the elastic part."""
+    return 1.0
+
+
+def fixed_damping(rate, damping):
+    """1 + chi d'."""
+    return 1.0 + damping * rate
+
 
 LAWS = {
+    "hertz": ContactLaw(
+        words="Hertz's elastic contact, without loss",
+        source="Lankarani and Nikravesh 1990, doi:10.1115/1.2912617, for internal contact of spheres",
+        formula="K d^1.5", valid="small contacts: up to 30 degrees to either side", factor=elastic_alone,
+        **{**HERTZIAN, "damping": lambda: 0.0, "without_loss": ""},
+    ),
+    "hunt-crossley": ContactLaw(
+        words="Hunt and Crossley's, with a fixed damping factor",
+        source="Hunt and Crossley 1975, doi:10.1115/1.3423596", formula="K d^1.5 (1 + chi d')",
+        valid="any impact speed; chi is a property of the contact, not of the impact",
+        parameters=(
+            Parameter(
+                "damping", "s/m", "fixed damping factor chi", least=0, example="0.5 (s/m)", called="fixed damping factor"
+            ),
+        ),
+        factor=fixed_damping, lossless=lambda values: values["damping"] == 0, **HERTZIAN,
+    ),
     "flores": by_restitution(
         lambda c_e: 1.6 * (1.0 - c_e) / c_e, "8 (1 - c_e)/(5 c_e)",
         whose="Flores and others's", source="Flores et al. 2011, doi:10.1007/s11044-010-9237-4",
