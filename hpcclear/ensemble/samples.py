@@ -105,11 +105,10 @@ def samples_of(
 ) -> Results:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
     about = {**attributes, "sampling": points.sampling} if points.sampling else attributes
-    designs, words = (
-        (points.names, points.values, points.units),
-        (points.words, joints, points.labels),
-    )
-    return dataset.samples_dataset(*designs, records, about, objective, *words)
+    return dataset.samples_dataset(
+        points.names, points.values, points.units, records, about, objective,
+        points.words, joints, points.labels,
+    )  # fmt: skip
 
 
 def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.fields import Content
 
 SHORTEST = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
 """Entries of a scene whose response is one revolution: for names and units of its series, or to compile."""
@@ -90,7 +91,7 @@ class _Keeper:
 class ResponsesPayload(NamedTuple):
     """What a rank needs to know of responses, as `responses_of` has it."""
 
-    content: dict[str, Any]
+    content: Content
     variants: Sequence[Mapping[str, object]]
     evaluate: Callable[[Scene, Results], Array]
     dtype: np.dtype

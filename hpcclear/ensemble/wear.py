@@ -39,14 +39,11 @@ PERTURBATION = 1e-9
 def check_worn(scene: Scene) -> None:
     """Refuse a scene that has no lives to follow. Raises InputError."""
     if scene.wear is None:
-        reason, remedy = "the scene has no [wear] table", "Add [wear], as in jobs/wear.toml"
-        raise InputError("wear", None, reason, remedy)
+        remedy = "Add [wear], as in jobs/wear.toml"
+        raise InputError("wear", None, "the scene has no [wear] table", remedy)
     if not scene.worn_joints():
-        reason, remedy = (
-            "no joint of the scene wears",
-            "Give one a table wear, as in jobs/wear.toml",
-        )
-        raise InputError("joints", None, reason, remedy)
+        remedy = "Give one a table wear, as in jobs/wear.toml"
+        raise InputError("joints", None, "no joint of the scene wears", remedy)
     alike = scene.study is None or not of_lives(scene).required_study.random
     if scene.wear.lives > 1 and alike:
         reason = "without random inputs all service lives are the same"

@@ -1,9 +1,11 @@
 """What a machine is called and who answers for it: texts that pages and files show, and that change no result."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
-from hpcclear.scene.fields import Converted, Entries, Table, invalid
+from pydantic.json_schema import JsonSchemaValue
+
+from hpcclear.scene.fields import Content, Converted, Entries, Table, invalid
 
 LONGEST = 120
 """Letters of a text."""
@@ -22,12 +24,12 @@ class ShortText(Converted):
             raise invalid(f"must be one line of 1 to {LONGEST} letters", "Shorten it, or remove it")
         return text
 
-    def json_schema(self) -> dict[str, Any]:
+    def json_schema(self) -> JsonSchemaValue:
         """A text of so many letters."""
         return {"type": "string", "minLength": 1, "maxLength": LONGEST}
 
 
-def inputs_of(content: Entries) -> dict[str, Any]:
+def inputs_of(content: Entries) -> Content:
     """Return what results follow from: the content of a scene but for [about]."""
     return {name: table for name, table in content.items() if name != "about"}
 

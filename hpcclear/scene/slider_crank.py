@@ -5,7 +5,7 @@ Nothing below the scene depends on which template wrote a linkage; `SERIES` and 
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -15,6 +15,7 @@ from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
 from hpcclear.scene.driving import CrankSpeed, CrankTorque, PlanarDrive, PlanarSpeed, PlanarTorque
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import (
+    Content,
     Entries,
     Inertia,
     Length,
@@ -189,7 +190,7 @@ def linkage_of(
     bars = [PlanarBody.model_construct(name=n, **_entries(link, Link)) for n, link in links.items()]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
     own = mechanism.slider
-    turning: dict[str, Any] = {} if own.inertia is None else {"inertia": own.inertia}
+    turning: Content = {} if own.inertia is None else {"inertia": own.inertia}
     slider = PlanarBody.model_construct(name="slider", mass=own.mass, points=(pin,), **turning)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
@@ -215,18 +216,18 @@ def linkage_of(
     )
 
 
-def _entries(table: Table, of: type[Table]) -> dict[str, Any]:
+def _entries(table: Table, of: type[Table]) -> Content:
     """Entries of a table that it has in common with the linkage's."""
     return {name: getattr(table, name) for name in of.model_fields}
 
 
-def _materials(joint: ClearanceJoint | SliderGuide) -> dict[str, Any]:
+def _materials(joint: ClearanceJoint | SliderGuide) -> Content:
     return {"materials": Materials.model_construct(bearing=joint.bearing, journal=joint.journal)}
 
 
 def _joint(name: str, joint: ClearanceJoint | IdealJoint) -> PlanarJoint:
     journal, bearing = JOINTS[name]
-    places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
+    places: Content = {"name": name, "journal": journal, "bearing": bearing}
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
     entries = _entries(joint, PinInBearing) | _materials(joint)
