@@ -1,8 +1,7 @@
 """Every kind of result file, and the names that several of them share."""
 
 import pkgutil
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Mapping
 from importlib import import_module
 
 import numpy as np
@@ -35,29 +34,13 @@ ALL_ON = "all on"
 """Name of the whole scene there."""
 
 
-class _Kinds(Mapping[str, ResultKind]):
-    """The kinds by their names, those of the files of `hpcclear.results.kinds`; each is loaded when it is first used."""
+_FOUND: dict[str, ResultKind] = {
+    one.name: import_module(f"{kinds.__name__}.{one.name}").KIND
+    for one in pkgutil.iter_modules(kinds.__path__)
+}
 
-    def __getitem__(self, name: str) -> ResultKind:
-        if name not in _names():
-            raise KeyError(name)
-        kind: ResultKind = import_module(f"{kinds.__name__}.{name}").KIND
-        return kind
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(sorted(_names(), key=lambda name: self[name].order))
-
-    def __len__(self) -> int:
-        return len(_names())
-
-
-@cache
-def _names() -> frozenset[str]:
-    return frozenset(one.name for one in pkgutil.iter_modules(kinds.__path__))
-
-
-KINDS: Mapping[str, ResultKind] = _Kinds()
-"""Every kind of result file by its name, in their order."""
+KINDS: Mapping[str, ResultKind] = dict(sorted(_FOUND.items(), key=lambda one: one[1].order))
+"""Every kind of result file by its name, in their order: those of the files of `hpcclear.results.kinds`."""
 
 ROLE = "design_variable"  # value of the attribute `role` of design variables
 
