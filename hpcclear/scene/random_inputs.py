@@ -12,16 +12,8 @@ from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.plugins import DISTRIBUTIONS
 from hpcclear.plugins.sources import SCIPY
-from hpcclear.scene.fields import (
-    LONGEST_CURVE,
-    Bounds,
-    Content,
-    Entries,
-    Number,
-    Numbers,
-    Quantity,
-    invalid,
-)
+from hpcclear.scene import fields
+from hpcclear.scene.fields import LONGEST_CURVE, Content, Entries, Quantity, invalid
 from hpcclear.scene.fits import Tolerance, law_of
 from hpcclear.scene.named import NamedInput, Range, with_paths
 from hpcclear.scene.paths import quantities
@@ -204,27 +196,27 @@ class RandomInput(NamedInput):
     distribution: str
     """The distribution. "samples": measured values. "wear": clearances after the service lives of `[wear]`. Also any continuous
     distribution of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a file."""
-    range: Bounds = None
+    range: fields.Bounds = None
     """Bounds of a "uniform" or "beta" distribution, truncation of the others, SI."""
-    mean: Number = None
+    mean: fields.Number = None
     """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the design. For
     "lognormal": mean before truncation."""
-    half_width: Number = None
+    half_width: fields.Number = None
     """Half-width of "uniform", "truncated-normal" and "beta", SI, or a percentage such as "3 %": of the value that each
     design has if the study varies it, else of the nominal value. For "wear": half-width of the uniform distribution of
     new clearances around the value of the scene."""
-    deviation: Number = None
+    deviation: fields.Number = None
     """Standard deviation of "normal", SI, or a percentage as of `half_width`; of "truncated-normal" and "lognormal" before
     truncation."""
     shapes: tuple[float, float] | None = None
     """For "beta": a and b of the density x^(a-1) (1-x)^(b-1), with x from 0 to 1 over the range."""
     shape: float | None = None
     """For "weibull": k in the probability exp(-((x - location)/scale)^k) of exceeding x."""
-    scale: Number = None
+    scale: fields.Number = None
     """For "weibull": scale in that probability, SI."""
-    location: Number = None
+    location: fields.Number = None
     """For "weibull": smallest value, SI; default 0."""
-    values: Numbers = None
+    values: fields.Numbers = None
     """For "samples": measured values with equal probability, SI. Alternatively `file`, a CSV table beside the scene
     file, and `column`, its heading."""
     fit: str | None = None

@@ -10,21 +10,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from hpcclear.base.written import shown
+from hpcclear.scene import fields
 from hpcclear.scene.contacts.guide import Guide, PlanarSlide
 from hpcclear.scene.contacts.pin_in_bearing import PinInBearing, PlanarClearance
 from hpcclear.scene.driving import CrankSpeed, CrankTorque, PlanarDrive, PlanarSpeed, PlanarTorque
 from hpcclear.scene.effects import EffectTables
-from hpcclear.scene.fields import (
-    Content,
-    Entries,
-    Inertia,
-    Length,
-    Mass,
-    NamedPlace,
-    PositiveLength,
-    Table,
-    invalid,
-)
+from hpcclear.scene.fields import Content, Entries, Table, invalid
 from hpcclear.scene.joints import IdealPinFriction, Material, Materials, PlanarRevolute
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.planar import BarBending, Ground, Planar, PlanarBody, PlanarJoint
@@ -33,13 +24,13 @@ from hpcclear.scene.planar import BarBending, Ground, Planar, PlanarBody, Planar
 class Link(Table):
     """A bar between two joints, rigid unless it bends."""
 
-    length: PositiveLength
+    length: fields.PositiveLength
     """Distance between the joints of the bar, m."""
-    mass: Mass
+    mass: fields.Mass
     """Mass, kg."""
-    inertia: Inertia
+    inertia: fields.Inertia
     """Moment of inertia about its mass centre, kg m2."""
-    mass_center: Length
+    mass_center: fields.Length
     """Distance of the mass centre from its first joint along the link, m; may lie beyond either pin."""
     bending: BarBending | None = None
     """Bending of the rod. Without it the rod is rigid."""
@@ -48,9 +39,9 @@ class Link(Table):
 class Slider(Table):
     """The guided body."""
 
-    mass: Mass
+    mass: fields.Mass
     """Mass, kg."""
-    inertia: Inertia | None = None
+    inertia: fields.Inertia | None = None
     """Moment of inertia about its pin, which is its mass centre, kg m2. Required if its guide has clearance."""
 
 
@@ -61,7 +52,7 @@ class SliderCrank(Table):
     crank: Link
     rod: Link
     slider: Slider
-    offset: Length | None = None
+    offset: fields.Length | None = None
     """Distance of the slider's line from the crank's axis along +y, m. Without it the line passes through the axis."""
 
     def _check(self) -> None:
@@ -103,7 +94,7 @@ class SliderGuide(Guide):
     """The guide of a slider-crank, with clearance."""
 
     kind: Literal["slide"]
-    clearance: PositiveLength
+    clearance: fields.PositiveLength
     """Gap on either side of a slider in the middle of its channel, m."""
     bearing: Material
     """Material of the channel."""
@@ -188,13 +179,13 @@ def linkage_of(
     """The tables of the linkage that a slider-crank is; they are valid since its own are."""
     links = {"crank": mechanism.crank, "rod": mechanism.rod}
     bars = [PlanarBody.model_construct(name=n, **_entries(link, Link)) for n, link in links.items()]
-    pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
+    pin = fields.NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
     own = mechanism.slider
     turning: Content = {} if own.inertia is None else {"inertia": own.inertia}
     slider = PlanarBody.model_construct(name="slider", mass=own.mass, points=(pin,), **turning)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
-        beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
+        beside = fields.NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
         ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
     guide = PlanarSlide.model_construct(
         name="guide", kind="slide", point="slider.pin", line=line,
