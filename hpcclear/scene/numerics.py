@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from hpcclear.base.outcome import MAX_BANDS
 from hpcclear.plugins import OBJECTIVES
@@ -53,13 +53,13 @@ class Numerics(Table):
     combines; default: all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
     """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status STEP_CAP."""
-    energy: Annotated[bool, Field(strict=True)] = False
+    energy: StrictBool = False
     """Whether each sample also records its energy balance."""
-    responses: Annotated[bool, Field(strict=True)] = False
+    responses: StrictBool = False
     """Whether each sample also records mean contact forces, peak torque of the drive and standard deviation of the
     slider acceleration. Enabled automatically if the study needs one of them."""
 
-    impacts: Annotated[bool, Field(strict=True)] = False
+    impacts: StrictBool = False
     """Whether each sample also records measures of impact and noise. For each joint and revolution: number of impacts,
     energy lost in them, impulse, angle without contact, RMS contact force. For the mechanism: RMS force on the frame.
     Enabled automatically if the study needs one of them."""

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import StrictBool
 
 from hpcclear.base.errors import InputError
 from hpcclear.plugins import SEARCHES, SURROGATES
@@ -105,7 +105,7 @@ class CertificateOfEffects(Table):
     """Largest relative change of mean and standard deviation of f that counts as negligible."""
     samples: Annotated[int, Count(64, 10**9)] | None = None
     """Largest number of simulations of each variant; default: a twentieth of the study in total."""
-    forces: Annotated[bool, Field(strict=True)] = False
+    forces: StrictBool = False
     """Whether peak contact forces must stay within the tolerance, too."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import StrictBool
 
 from hpcclear.base import quantiles
 from hpcclear.plugins import OBJECTIVES
@@ -70,7 +70,7 @@ class StudyTables(Table):
     surrogate: stages.Surrogate = stages.Surrogate()
     swarm: stages.Swarm = stages.Swarm()
     verification: stages.Verification = stages.Verification()
-    worst_case: Annotated[bool, Field(strict=True)] = False
+    worst_case: StrictBool = False
     """Whether to search the largest f of the best designs within the bounds of the random inputs (corners and inside).
     Inputs without bounds are taken within three standard deviations."""
     certificate: stages.CertificateOfEffects | None = None

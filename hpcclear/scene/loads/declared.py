@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterable
 from types import NoneType
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import StrictBool
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
@@ -106,7 +106,7 @@ class SizedLoad(Load):
     """Its entry; ``ENTRY_by_time`` has the curve over the time."""
     unit: ClassVar[str]
 
-    repeats: Annotated[bool, Field(strict=True)] = False
+    repeats: StrictBool = False
     """Whether the table over time repeats after its last row."""
     angle_of: str | None = None
     """Another body against whose angle the table is read; it repeats with each turn of that body."""

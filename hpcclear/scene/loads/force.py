@@ -3,7 +3,7 @@
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import StrictBool
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
@@ -36,7 +36,7 @@ class ForceLoad(SizedLoad):
     """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
     direction: Angle = 0.0
     """Angle of the force from the ground's x axis, rad."""
-    follows: Annotated[bool, Field(strict=True)] = False
+    follows: StrictBool = False
     """Whether the force rotates with the body. Components and direction then refer to the axes of the body."""
 
     size_entry: ClassVar[str] = "size"
