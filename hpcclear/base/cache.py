@@ -3,15 +3,13 @@
 import re
 from pathlib import Path
 
-_CACHES = Path("/sys/devices/system/cpu/cpu0/cache")
-
 USUAL = 32 * 1024
 """Bytes where the system does not say."""
 
 
-def first_level_cache(caches: Path = _CACHES) -> int:
+def first_level_cache() -> int:
     """Bytes of a core's first-level cache of data, as Linux states it of the first core; `USUAL` where it does not."""
-    for index in sorted(caches.glob("index*")):
+    for index in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
         try:
             said = " ".join((index / name).read_text() for name in ("level", "type", "size"))
         except OSError:

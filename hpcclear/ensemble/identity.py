@@ -9,7 +9,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.about import inputs_of
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.points import Points
-from hpcclear.statistics.streams import BINS, BLOCK
 
 
 def run_key(scene: Scene, command: str) -> dict[str, str]:
@@ -32,9 +31,3 @@ def sample_key(scene: Scene, points: Points) -> dict[str, str]:
     named = repr((points.names, points.paths, *labels))
     digest = hashlib.sha256(points.values.tobytes() + named.encode())
     return {**run_key(scene, "sample"), "points": digest.hexdigest()[:16]}
-
-
-def statistics_key(scene: Scene, samples: int) -> dict[str, str]:
-    """The key of `sample --statistics`: the run's, and how so many samples are summed up."""
-    layout = f"{samples} in blocks of {BLOCK}, {BINS} bins"
-    return {**run_key(scene, "sample --statistics"), "statistics": layout}

@@ -13,7 +13,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
-from hpcclear.ensemble.identity import statistics_key
+from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import samples_of, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
@@ -25,7 +25,7 @@ from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
-from hpcclear.statistics.streams import BLOCK, QUANTITIES, Accumulator, Summary, rows_of
+from hpcclear.statistics.streams import BINS, BLOCK, QUANTITIES, Accumulator, Summary, rows_of
 
 STAGE = "statistics"
 
@@ -73,7 +73,8 @@ def run_statistics(
         raise InputError(f"study.variables.{name}", None, reason, remedy)
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
-    key = statistics_key(scene, len(points))
+    layout = f"{len(points)} in blocks of {BLOCK}, {BINS} bins"
+    key = {**run_key(scene, "sample --statistics"), "statistics": layout}
     with Session(place, key, ranks, options) as session, _keeping(raw, session) as folder:
         content = session.found("statistics")
         blocks = range(-(-len(points) // BLOCK))
