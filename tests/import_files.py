@@ -10,9 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hpcclear.scene.importers import drawing_of, scene_of
+
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 SHOWN = 24.5 / 96
 """mm of a unit of the program Linkage."""
+
+
+def linkage_of(path, unit=""):
+    """The tables of a scene whose linkage has its points where a file has them."""
+    return scene_of(drawing_of(path, unit), str(path))
 
 
 class Machine(NamedTuple):

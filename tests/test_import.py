@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from import_files import linkage_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report.figures.placed import Placed
 from hpcclear.scene import load_scene
-from hpcclear.scene.importers import linkage_of, text_of
+from hpcclear.scene.importers import text_of
 
 FOUR_BAR = """name;x [mm];y [mm];bodies
 A0;0;0;ground crank

@@ -10,7 +10,7 @@ from commands import run
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.scene import load_scene
-from hpcclear.scene.importers import drawing_of, linkage_of, scene_of, summary, text_of
+from hpcclear.scene.importers import drawing_of, scene_of, summary, text_of
 from hpcclear.scene.importers.dxf import _UNITS
 
 NIGHTLY = pytest.mark.nightly
@@ -75,11 +75,11 @@ def test_a_known_mechanism_is_imported_whole(name, seed, tmp_path):
 def test_each_row_of_a_link_of_pmks_is_one(kind, tmp_path):
     made = files.machine(np.random.default_rng(1), 1, 2)
     (tmp_path / "p.pmks").write_bytes(files.project(made, kinds=kind))
-    assert len(linkage_of(tmp_path / "p.pmks")["mechanism"]["bodies"]) == len(made.bodies)
+    assert len(files.linkage_of(tmp_path / "p.pmks")["mechanism"]["bodies"]) == len(made.bodies)
     other = files.project(made, kinds=kind).replace(f"{kind}R".encode(), b"ZR", 1)
     (tmp_path / "p.pmks").write_bytes(other)
     with pytest.raises(InputError, match="no kind of link that is known"):
-        linkage_of(tmp_path / "p.pmks")
+        files.linkage_of(tmp_path / "p.pmks")
 
 
 def _project(*rows):
@@ -95,7 +95,7 @@ def test_a_slider_of_pmks_may_be_one_joint(tmp_path):
         (tmp_path / "p").write_bytes(
             _project(crank, pin, f"{flags}C,C,{d(6000)},0,0{slot}".replace("13C", "DC"), *bars)
         )
-        made = linkage_of(tmp_path / "p")["mechanism"]
+        made = files.linkage_of(tmp_path / "p")["mechanism"]
         row = made["joints"]["C_guide"]
         assert (row["line"], row["angle"]) == (guide, "0.0 deg")
         assert row["point"] == (
@@ -103,7 +103,7 @@ def test_a_slider_of_pmks_may_be_one_joint(tmp_path):
         )  # a welded one does not turn
     (tmp_path / "p").write_bytes(_project(crank, pin, f"7C,C,{d(6000)},0,0,,,,{d(500)}", *bars))
     with pytest.raises(InputError, match="driven along a line"):
-        linkage_of(tmp_path / "p")
+        files.linkage_of(tmp_path / "p")
 
 
 @pytest.mark.parametrize("code", [*_UNITS, 0, 25])

@@ -8,13 +8,13 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from import_files import DIGITS, digits, drawn
+from import_files import DIGITS, digits, drawn, linkage_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report.figures.placed import Placed
 from hpcclear.scene import load_scene
-from hpcclear.scene.importers import drawing_of, linkage_of
+from hpcclear.scene.importers import drawing_of
 
 FOUR_BAR = {"A": (-12.25, -3.0), "B": (-9.5, 4.75), "C": (11.0, 9.125), "D": (13.5, -6.25)}
 SIZE = 25.4e-3 / 96

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 from hpcclear.base.errors import at, content_of
 from hpcclear.base.units import to_si
-from hpcclear.scene.fields import Content
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
 from hpcclear.scene.importers.file import File
 from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
 
-__all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "summary", "text_of"]
+__all__ = ["FORMATS", "Drawing", "drawing_of", "scene_of", "summary", "text_of"]
 
 LARGEST_FILE = 20_000_000
 
@@ -52,8 +51,3 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
     found = next(one for one in FORMATS if one.module.begins(data[:4096]))
     made: Drawing = found.module.drawing_of(File(path, data, unit, found.again))
     return made
-
-
-def linkage_of(path: Path, unit: str = "") -> Content:
-    """The tables of a scene whose linkage has its points where a file has them; see `drawing_of`."""
-    return scene_of(drawing_of(path, unit), str(path))
