@@ -112,7 +112,7 @@ def searched(points, values, restarts):
     values = (values - values.mean()) / values.std()
     bounds = np.array([(1e-3, 1e3), *[(1e-2, 1e2)] * points.shape[1], (1e-8, 10.0)])
     start = np.array([1.0, *[0.5] * points.shape[1], 1e-3])
-    found = maximise(points, values, start, bounds, restarts, 3)
+    found = maximise(points, values, [start], bounds, restarts, 3)
     theta = np.log([found.signal_variance, *found.length_scales, found.noise_variance])
     return found, negative_likelihood(theta, points - 0.5, values)[0], theta, values
 

@@ -81,6 +81,7 @@ class CaseSearch:
         self._most = settings.infill_rounds * settings.infill_designs
         self._batch = max(settings.infill_designs // PARTS, 1)
         self._idle, self._hope = 0, 0.0
+        self._last: Beliefs | None = None
         self._least = AREA if len(case.goals) < 3 else AREA / 5.0
         unit = unit_lhs(all_over(run.study, case), len(self._names), self._rng)
         wide = choices(run, case.name, self._region.at(unit))
@@ -197,7 +198,8 @@ class CaseSearch:
     # -- what is known -------------------------------------------------------------------------------
 
     def _beliefs(self) -> Beliefs:
-        return Beliefs(self._known(), self._space, self._rng)
+        self._last = Beliefs(self._known(), self._space, self._rng, self._last)
+        return self._last
 
     def _known(self) -> Known:
         """Objectives and constraints of all designs so far, with their standard errors."""
@@ -344,11 +346,11 @@ class CaseSearch:
 
 
 def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -> None:
-    """Twice the simulations of designs of several cases, and first ones of new designs; twice again where these then are as
-    many as another of the designs has."""
+    """Twice the simulations of designs of several cases, and first ones of new designs."""
     where = [(one.designs, row) for one, rows in asked for row in rows]
-    for length in sorted({one.made[row].shape[2] for one, row in where}):
-        alike = [(one, row) for one, row in where if one.made[row].shape[2] == length]
+    before = [one.made[row].shape[2] for one, row in where]
+    for length in sorted(set(before)):
+        alike = [at for at, own in zip(where, before, strict=True) if own == length]
         chosen = [one.choices[row] for one, row in alike]
         fresh = truth.drawn(run, chosen, "search", length or FIRST, length)
         for (one, row), values in zip(alike, fresh, strict=True):

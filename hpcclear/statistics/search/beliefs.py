@@ -29,6 +29,10 @@ LENGTHS = (0.1, 3.0)
 LIKELY = 0.5
 """Probability of keeping the constraints from which a design may be the best."""
 
+DOUBT = 1.5
+"""What is not known of a constraint over what its model says: length scales are estimates themselves, and where too long ones
+say that a constraint is broken no design would show that it is not."""
+
 OfDesigns = Callable[[Array], Array]
 """A function of designs (n, d)."""
 
@@ -87,23 +91,32 @@ class Trended:
 class Beliefs:
     """Models of all objectives and constraints over designs. Raises InputError: fewer than d + 3 finite values.
 
+    Their length scales are sought from those of `before` on, of fewer designs, if there are any.
+
     `believed` (n, m): objectives of the designs that were evaluated; `allowed` (n,): which of them are likely to keep the
     constraints.
     """
 
-    def __init__(self, known: Known, space: Space, rng: np.random.Generator) -> None:
+    def __init__(
+        self, known: Known, space: Space, rng: np.random.Generator, before: "Beliefs | None" = None
+    ) -> None:
         self.known, self.space, self.rng = known, space, rng
         count = len(space.exact)
         none = [lambda points: np.zeros(len(points))] * (count + known.excess.shape[1])
         trends = space.trends or none
 
-        def model(values: Array, errors: Array, trend: OfDesigns) -> Trended:
-            return _trended(known.designs, values, errors, trend, space.bounds, rng)
+        def model(values: Array, errors: Array, trend: OfDesigns, last: Trended | None) -> Trended:
+            like = last.rest if last else None
+            return _trended(known.designs, values, errors, trend, space.bounds, rng, like)
 
-        each = zip(space.exact, known.values.T, known.errors.T, trends[:count], strict=True)
-        self.models = [None if exact else model(*one) for exact, *one in each]
-        kept = zip(known.excess.T, known.excess_errors.T, trends[count:], strict=True)
-        self.limits = [model(*one) for one in kept]
+        models: Sequence[Trended | None] = before.models if before else [None] * count
+        each = zip(space.exact, known.values.T, known.errors.T, trends[:count], models, strict=True)
+        self.models: list[Trended | None] = [None if exact else model(*one) for exact, *one in each]
+        limits: Sequence[Trended | None] = (
+            before.limits if before else [None] * known.excess.shape[1]
+        )
+        kept = zip(known.excess.T, known.excess_errors.T, trends[count:], limits, strict=True)
+        self.limits: list[Trended] = [model(*one) for one in kept]
         self.pending = known.designs[:0]
         self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
         self.believed = self.means(known.designs)
@@ -137,9 +150,9 @@ class Beliefs:
         return np.hstack([none, *means]) + margins, np.hstack([none, *spreads]) + 1e-12
 
     def feasible(self, points: Array) -> Array:
-        """Probability of keeping the constraints, (n, d) to (n,)."""
+        """Probability of keeping the constraints, (n, d) to (n,), with `DOUBT` of their models."""
         means, spreads = self.shortfalls(points)
-        return np.asarray(ndtr(-means / spreads).prod(axis=1))
+        return np.asarray(ndtr(-means / (DOUBT * spreads)).prod(axis=1))
 
     def take(self, point: Array) -> None:
         """A design as if it were evaluated, at what is expected of it."""
@@ -160,6 +173,7 @@ def _trended(
     trend: OfDesigns,
     bounds: Array,
     rng: np.random.Generator,
+    like: Kriging | None,
 ) -> Trended:
     """A model with the trend or without it: the one with the smaller leave-one-out errors."""
     guess, known = trend(designs), np.isfinite(values)
@@ -168,28 +182,35 @@ def _trended(
     moves = squares > FLAT**2 * float(np.square(guess[known]).sum())
     slopes = [0.0, float(steps @ values[known]) / squares] if moves else [0.0]
     made = [
-        Trended(_fitted(designs, values - slope * guess, errors, bounds, rng), slope, trend)
+        Trended(_fitted(designs, values - slope * guess, errors, bounds, rng, like), slope, trend)
         for slope in slopes
     ]
     return min(made, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
 
 
 def _fitted(
-    designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
+    designs: Array,
+    values: Array,
+    errors: Array,
+    bounds: Array,
+    rng: np.random.Generator,
+    like: Kriging | None,
 ) -> Kriging:
     known = np.isfinite(values)
     size = float(np.std(values[known])) if known.any() else 0.0
     with np.errstate(invalid="ignore"):
         squares = np.where(errors > 0.0, errors, np.nan)[known] ** 2
     if not (size > 0.0 and np.isfinite(squares).any()):
-        return fit_kriging(designs, values, bounds, rng=rng, restarts=1, kernel=MATERN)
+        return fit_kriging(
+            designs, values, bounds, rng=rng, restarts=like is None, kernel=MATERN, like=like
+        )
     middle = float(np.nanmedian(squares))
     shares = np.ones(len(values))
     shares[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
     low, high = (max(factor * middle / size**2, 1e-8) for factor in NOISE)
     return fit_kriging(
-        designs, values, bounds, rng=rng, restarts=1, lengths=LENGTHS, kernel=MATERN,
-        noise=(low, max(high, 10.0 * low)), shares=shares,
+        designs, values, bounds, rng=rng, restarts=like is None, lengths=LENGTHS, kernel=MATERN,
+        noise=(low, max(high, 10.0 * low)), shares=shares, like=like,
     )  # fmt: skip
 
 

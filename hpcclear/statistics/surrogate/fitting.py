@@ -57,6 +57,7 @@ def fit_kriging(
     kernel: Kernel = SQUARED_EXPONENTIAL,
     noise: tuple[float, float] | None = None,
     shares: np.ndarray | None = None,
+    like: Kriging | None = None,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -64,7 +65,8 @@ def fit_kriging(
     which is left out and counted. `names`: of the inputs, x1, x2 and so on by default. The likelihood is maximised from
     `restarts` starting points besides the first, drawn by `rng`, with length scales (in the unit cube) between `lengths`, and
     the noise variance, in units of the variance of the values, between those of `noise`. `shares` (n,): noise variance of
-    each value over that one, where the errors of values are known; else they are all alike. Raises InputError: points outside
+    each value over that one, where the errors of values are known; else they are all alike. `like`: a model of nearly the same
+    values, whose length scales and variances are one more starting point. Raises InputError: points outside
     the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     from threadpoolctl import threadpool_limits
@@ -82,13 +84,16 @@ def fit_kriging(
     known = np.ones(len(values)) if shares is None else np.asarray(shares, dtype=np.float64)
     limits = noise or NOISE_BOUNDS
     dims = unit.shape[1]
-    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *limits)])
+    starts = [np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *limits)])]
     box = np.array([SIGNAL_BOUNDS, *[lengths] * dims, limits])
+    if like is not None:
+        last = np.array([like.signal_variance, *like.length_scales, like.noise_variance])
+        starts.append(np.clip(last, *box.T))
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):
         found = maximise(
-            unit, (outcomes - mean) / scale, start, box, restarts, seed, kernel=kernel, shares=known[valid]
+            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, shares=known[valid]
         )  # fmt: skip
     return Kriging(
         labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],

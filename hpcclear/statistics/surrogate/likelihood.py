@@ -13,6 +13,7 @@ Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine 
 is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, further starts uniform in these).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +54,7 @@ class Fitted:
 def maximise(
     unit: Array,
     values: Array,
-    start: Array,
+    known: Sequence[Array],
     bounds: Array,
     restarts: int,
     seed: int,
@@ -64,13 +65,13 @@ def maximise(
     """The most likely signal variance, length scales and noise variance of values (n,) of mean 0 at points (n, d) in the unit
     cube.
 
-    The search begins from `start` (d + 2,), in this order, and from further `restarts` by the seed, within `bounds` (d + 2,
-    2). `shares` (n,): noise variance of each value over the one that is sought.
+    The search begins from those that are `known`, (d + 2,) each in this order, and from further `restarts` by the seed, within
+    `bounds` (d + 2, 2). `shares` (n,): noise variance of each value over the one that is sought.
     """
     shares = np.broadcast_to(shares, len(values))
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
-    starts = [np.log(start)]
+    starts = [np.log(one) for one in known]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
     if len(parts) == 1:
