@@ -13,10 +13,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.merit import recommended
+from hpcclear.scene.cases import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random import tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
 from hpcclear.study import rare
+from hpcclear.study.failures import Failures, WeightedDraws, excess_of
 
 # -- indices ----------------------------------------------------------------------------------------
 
@@ -290,3 +292,28 @@ def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch
     else:
         on_ranks(scene, tmp_path)
     assert contents(tmp_path / "out") == whole
+
+
+def _draws(one: Failures, failing: float) -> None:
+    """Weighted draws of design 0 of which some fail, each with a weight of 1e-3."""
+    weights = np.zeros(8 * REPEATS)
+    weights[:: round(1.0 / failing)] = 1e-3
+    one.drawn = {0: [WeightedDraws(0, np.zeros((len(weights), 2)), weights)]}
+
+
+@pytest.mark.parametrize("count", [512, 4096])
+@pytest.mark.parametrize("probability", [2e-2, 5e-2])
+def test_weighted_draws_that_miss_a_way_to_fail_are_not_believed(count, probability):
+    """Of plain simulations more fail than the draws allow for: these decide. Where as many fail as they say, the draws do."""
+    goal = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
+    one = Failures.__new__(Failures)
+    one.goals = [goal]
+    _draws(one, 0.5)  # 5e-4
+    f = np.zeros(count)
+    f[: round(probability * count)] = 2.0
+    plain = excess_of(goal, made := np.random.default_rng(3).permutation(f).reshape(1, 16, -1), {})
+    assert one.excess(0, 0, *plain[:2], made) == plain[:2]
+    f[:] = 0.0
+    f[: round(5e-4 * count)] = 2.0
+    rare_value, _ = one.excess(0, 0, 0.0, 0.0, f.reshape(1, 16, -1))
+    assert rare_value == pytest.approx(tail.of_share(1e-3) - tail.of_share(5e-4))

@@ -206,7 +206,8 @@ class CaseSearch:
         found, count = self.designs.known(), len(self._case.goals)
         for row, k in itertools.product(self._failures.drawn, range(len(self._failures.goals))):
             column = count + self._case.kept.index(self._failures.goals[k])
-            found[row, :, column] = self._failures.excess(row, k, *found[row, :, column])
+            plain = *found[row, :, column], self.designs.made[row]
+            found[row, :, column] = self._failures.excess(row, k, *plain)
         (values, errors), (excess, doubts) = (
             np.moveaxis(part, 1, 0) for part in np.split(found, [count], axis=2)
         )

@@ -10,7 +10,7 @@ from collections.abc import Generator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import bdtrc, ndtri
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene.cases import Case, Constraint
@@ -30,6 +30,9 @@ PLENTY = 0.2
 CLOSE, FEW, PILOT, ENOUGH = 1.0, 8, 256, 4
 """Indices from the threshold within which designs get weighted draws; these of each repeat; draws of each level of their pilot;
 failures for each random input from which a density is fitted anew."""
+
+MISSED = 1e-4
+"""Chance of as many failures in plain simulations as there are, by the weighted draws, below which these are not believed."""
 
 HITS, FAR, BEYOND = 3, 4.0, 0.1
 """Failures from which on their share is an index, else the largest values are; shortfall of an index beyond which the order
@@ -84,14 +87,22 @@ class Failures:
         own = self.drawn[row]
         return sum(len(one.u) for one in own) // (len(self.goals) * importance.REPEATS)
 
-    def excess(self, row: int, k: int, value: float, error: float) -> tuple[float, float]:
-        """`excess_of` a design by its weighted draws; the given value and error where no draw fails."""
+    def excess(
+        self, row: int, k: int, value: float, error: float, made: Array | None = None
+    ) -> tuple[float, float]:
+        """`excess_of` a design by its weighted draws. The given value and error where no draw fails, or where so many of the
+        plain simulations `made` do that the density misses a way to fail."""
         own = [one.weights for one in self.drawn[row] if one.constraint == k]
         each = np.hstack([one.reshape(importance.REPEATS, -1) for one in own]).mean(axis=1)
-        share = float(each.mean())
+        share, goal = float(each.mean()), self.goals[k]
         if not 0.0 < share < 1.0:
             return value, error
-        return _index_of(self.goals[k], share, float(spread((each - share)[None])[0]))
+        if made is not None:
+            f = made[goal.place][np.isfinite(made[goal.place])]
+            failing = int((f > goal.limit).sum())
+            if failing >= HITS and bdtrc(failing - 1, len(f), share) < MISSED:
+                return value, error
+        return _index_of(goal, share, float(spread((each - share)[None])[0]))
 
     def _prepared(self, goal: Constraint) -> Generator[Array, Array, None]:
         """Yield draws, take f there, and keep the density that is found."""
