@@ -83,11 +83,11 @@ def _above_zero(values):
 
 
 def by_restitution(
-    factor: Function, formula: str, *, whose: str, source: str, valid: str, divides: bool = False
+    factor: Function, *, words: str, source: str, formula: str, valid: str, divides: bool = False
 ) -> ContactLaw:
     """The law with a damping coefficient a(c_e), a pure number; `divides`: by c_e, for which 0 then has no meaning."""
     return ContactLaw(
-        words=f"{whose}, damping by restitution",
+        words=words,
         source=source,
         formula=f"K d^1.5 (1 + a d'/d'_0), a = {formula}",
         valid=valid,

@@ -11,7 +11,7 @@ from pydantic.json_schema import JsonSchemaValue
 
 from hpcclear.base.errors import at
 from hpcclear.base.pieces import Rows
-from hpcclear.laws import laws
+from hpcclear.laws import laws, names
 from hpcclear.laws.declared import ContactLaw, Declared, FrictionLaw, Geometry, Law, Parameter
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.curves import Pairs
@@ -39,13 +39,13 @@ class LawName(Converted):
 
     def convert(self, value: object) -> str:
         """The name, known to be there; an error for validators where it is none."""
-        if value not in (known := tuple(laws(self.kind))):
+        if value not in (known := names(self.kind)):
             raise invalid("is not one of the known values", nearest(str(value), known))
         return str(value)
 
     def json_schema(self) -> JsonSchemaValue:
         """One of their names."""
-        return {"type": "string", "enum": [*laws(self.kind)]}
+        return {"type": "string", "enum": [*names(self.kind)]}
 
 
 @cache

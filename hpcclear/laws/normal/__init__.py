@@ -1,1 +1,1 @@
-"""Normal contact forces, one file a law or a family of laws."""
+"""Normal contact forces, one file a law."""

@@ -1,0 +1,18 @@
+"""Hu and Guo: damping by the coefficient of restitution."""
+
+from hpcclear.laws.hertz_contact import by_restitution
+
+
+def factor(restitution):
+    """Return a = 3 (1 - c_e)/(2 c_e)."""
+    return 1.5 * (1.0 - restitution) / restitution
+
+
+LAW = by_restitution(
+    factor,
+    words="Hu and Guo's, damping by restitution",
+    source="Hu and Guo 2015, doi:10.1007/s11012-015-0135-1",
+    formula="3 (1 - c_e)/(2 c_e)",
+    valid="0 < c_e <= 1",
+    divides=True,
+)
