@@ -144,36 +144,38 @@ def planted(bias, deviation, segments=64, seed=7):
 
 
 def test_bias_variance_and_price_that_were_planted_are_found():
-    found = spending.analyse(planted([0.1, 0.005, 0.0, 0.0, 0.0, 0.0], 0.03))
-    off = (found.bias - [0.1, 0.005, 0.0, 0.0, 0.0, 0.0]) / found.bias_error
+    wanted = [0.1, 0.005, 0.0, 0.0, 0.0, 0.0]
+    found = spending.analyse(planted(wanted, 0.03))
+    off = (found["tolerance_bias"] - wanted) / found["tolerance_bias_error"]
     assert (np.abs(off) < 4.5).all()
     # of ten revolutions 0.03^2; a variance over 32 copies scatters by a quarter of itself
-    np.testing.assert_allclose(found.variance, 10 * 0.03**2, rtol=0.9)
-    np.testing.assert_allclose(found.turn_seconds, [1e-3, 1.1e-3, 1.3e-3, 1.6e-3, 2e-3, 2.5e-3])
-    assert (found.error[0] > 0.095).all()  # no revolutions help against a bias
-    np.testing.assert_allclose(found.error[3, :5], found.model[3, :5], rtol=0.7)
-    assert found.error[3, 0] > 3.0 * found.error[3, 5]
+    np.testing.assert_allclose(found["turn_variance"], 10 * 0.03**2, rtol=0.9)
+    price = found["tolerance_seconds"]
+    np.testing.assert_allclose(price, [1e-3, 1.1e-3, 1.3e-3, 1.6e-3, 2e-3, 2.5e-3])
+    error = found["spent_error"]
+    assert (error[0] > 0.095).all()  # no revolutions help against a bias
+    np.testing.assert_allclose(error[3, :5], found["spent_model"][3, :5], rtol=0.7)
+    assert error[3, 0] > 3.0 * error[3, 5]
 
 
 def test_the_cheapest_tolerance_is_the_loosest_that_is_not_off():
     found = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03))
-    rtol, spent, seconds = found.cheapest(0.05)
+    rtol, spent, seconds = spending.cheapest(found, 0.05)
     assert rtol == 1e-4
     assert spent == pytest.approx(10 * 0.03**2 / (0.05**2 - 0.01**2), abs=5)
-    assert seconds == pytest.approx(1.1e-3 * (spent + 32 * found.spin_up), rel=0.01)
-    assert found.cheapest(0.004)[0] <= 1e-5  # 1e-4 is off by more
-    assert np.isnan(found.cheapest(1e-5)).all()  # no bias is known so well
-    two = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03, segments=32))
-    assert found.cheapest(0.004)[1] > found.cheapest(0.02)[1] > 0
-    assert two.revolutions == found.revolutions // 2
+    assert seconds == pytest.approx(1.1e-3 * (spent + 32 * found["spin_up"]), rel=0.01)
+    strict = spending.cheapest(found, 0.004)
+    assert strict[0] <= 1e-5  # 1e-4 is off by more
+    assert np.isnan(spending.cheapest(found, 1e-5)).all()  # no bias is known so well
+    assert strict[1] > spending.cheapest(found, 0.02)[1] > 0
 
 
 def test_copies_that_fail_are_left_out():
     run = planted([0.0] * 6, 0.03)
     run.gaps[10:, 2, 5] = np.nan
     found = spending.analyse(run)
-    assert np.isfinite(found.error[:, :5]).all()
-    assert abs(found.bias[2]) < 4.5 * found.bias_error[2]
+    assert np.isfinite(found["spent_error"][:, :5]).all()
+    assert abs(found["tolerance_bias"][2]) < 4.5 * found["tolerance_bias_error"][2]
 
 
 def test_a_run_that_was_cut_goes_on_as_if_it_had_not_been():

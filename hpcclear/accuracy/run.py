@@ -126,7 +126,7 @@ class Panels:
                 self._shown(longer)
 
     def _shown(self, run: spending.Run) -> None:
-        self.values.update(spending.analyse(run).variables)
+        self.values.update(spending.analyse(run))
         self._show(self.content(whole=False))
 
     def add_study(self) -> None:
@@ -181,10 +181,8 @@ def measure(
     """
     if scene.objective.joints:
         key, joints = "numerics.objective_joints", scene.numerics.objective_joints
-        reason, remedy = (
-            "accuracy is measured for all joints together",
-            "Leave the joints out for this command",
-        )
+        reason = "accuracy is measured for all joints together"
+        remedy = "Leave the joints out for this command"
         raise InputError(key, joints, reason, remedy)
     if not scene.clearance_joints():
         reason = "the objective is 0 without clearance"

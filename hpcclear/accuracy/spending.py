@@ -16,7 +16,7 @@ import numpy as np
 from hpcclear.accuracy.averaging import doubling
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.accuracy.profile import Variables
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady import judging
@@ -42,72 +42,6 @@ FIRST = 8
 
 AIMS = (0.1, 0.03, 0.01, 0.003, 0.001)
 """Relative standard errors whose cheapest price is reported."""
-
-
-@dataclass(frozen=True)
-class Spending:
-    """The panel; relative errors are root mean squares, seconds those of one core in full lanes."""
-
-    tolerance: Array
-    """Shape (r,)."""
-    spent: Integers
-    """Shape (n,): revolutions averaged, over all copies."""
-    error: Array
-    model: Array
-    """error and model, shape (r, n): measured over disjoint means of so many revolutions, NaN where there are fewer than
-    four; and by the formula."""
-    bias: Array
-    bias_error: Array
-    """bias and bias_error, shape (r,): of the mean at each tolerance against the mean of the tightest that agree, with its
-    standard error; NaN where it is that mean."""
-    variance: Array
-    """Shape (r,): of the mean of one revolution among many, relative."""
-    spin_up: float
-    """Revolutions that each copy leaves out: the motion's, whatever the tolerance."""
-    turn_seconds: Array
-    """Shape (r,): of a revolution."""
-    revolutions: int
-    """Of all copies at all tolerances."""
-
-    @property
-    def seconds(self) -> Array:
-        """What a mean costs, its spin-up included, shape (r, n)."""
-        return self.turn_seconds[:, None] * (self.spent[None, :] + COPIES * self.spin_up)
-
-    @property
-    def variables(self) -> Variables:
-        """The panel as the file has it."""
-        cheapest = np.array([self.cheapest(aim) for aim in AIMS]).T
-        names = ("cheapest_tolerance", "cheapest_revolutions", "cheapest_seconds")
-        return {
-            "tolerance": self.tolerance,
-            "spent": self.spent,
-            "aim": np.array(AIMS),
-            "spent_error": self.error,
-            "spent_model": self.model,
-            "spent_seconds": self.seconds,
-            "tolerance_bias": self.bias,
-            "tolerance_bias_error": self.bias_error,
-            "turn_variance": self.variance,
-            "tolerance_seconds": self.turn_seconds,
-            "spin_up": np.array(self.spin_up),
-            **dict(zip(names, cheapest, strict=True)),
-        }
-
-    def cheapest(self, aim: float) -> tuple[float, float, float]:
-        """Tolerance, revolutions and seconds that reach a standard error at the least cost by the formula.
-
-        NaN where no tolerance is known to be off by less than the aim.
-        """
-        bias = _known_bias(self.bias, self.bias_error)
-        doubtful = np.nan_to_num(np.abs(self.bias)) + 2.0 * np.nan_to_num(self.bias_error) > aim
-        left = np.where((bias < aim) & ~doubtful, aim**2 - bias**2, np.nan)
-        spent = np.maximum(self.variance / left, 1.0)
-        price = self.turn_seconds * (spent + COPIES * self.spin_up)
-        if np.isnan(price).all():
-            return np.nan, np.nan, np.nan
-        best = int(np.nanargmin(price))
-        return float(self.tolerance[best]), float(np.ceil(spent[best])), float(price[best])
 
 
 @dataclass(frozen=True)
@@ -167,8 +101,12 @@ def _lanes(scene: Scene, rtol: float) -> Lanes:
     return lanes
 
 
-def analyse(run: Run) -> Spending:
-    """Biases, variances and errors of what was simulated so far; copies that failed are left out."""
+def analyse(run: Run) -> Variables:
+    """The panel of what was simulated so far; copies that failed are left out.
+
+    `spent_error` is measured over disjoint means of so many revolutions, NaN where there are fewer than four; `spent_model` is
+    by the formula. Biases are against the mean of the tightest tolerances that agree, NaN where they are that mean.
+    """
     kept = [one[:, np.isfinite(one).all(axis=(0, 2))] for one in np.moveaxis(run.gaps, 1, 0)]
     spin_up = int(np.median([_spin_up(gaps) for gaps in kept]))
     kept = [gaps[spin_up:] for gaps in kept]
@@ -188,10 +126,40 @@ def analyse(run: Run) -> Spending:
     error = np.array([[_error(gaps, int(n) // SEGMENT, truth) for n in spent] for gaps in kept])
     model = np.sqrt(_known_bias(bias, bias_error)[:, None] ** 2 + variance[:, None] / spent)
     done = SEGMENT * COPIES * len(run.gaps)
-    return Spending(
-        np.array(TOLERANCES), spent, error, model, bias, bias_error, variance,
-        float(SEGMENT * spin_up), run.seconds / done, done * len(TOLERANCES),
-    )  # fmt: skip
+    price, waited = run.seconds / done, float(SEGMENT * spin_up)
+    found = {
+        "tolerance": np.array(TOLERANCES),
+        "spent": spent,
+        "aim": np.array(AIMS),
+        "spent_error": error,
+        "spent_model": model,
+        "spent_seconds": price[:, None] * (spent + COPIES * waited),
+        "tolerance_bias": bias,
+        "tolerance_bias_error": bias_error,
+        "turn_variance": variance,
+        "tolerance_seconds": price,
+        "spin_up": np.array(waited),
+    }
+    names = ("cheapest_tolerance", "cheapest_revolutions", "cheapest_seconds")
+    ways = np.array([cheapest(found, aim) for aim in AIMS]).T
+    return {**found, **dict(zip(names, ways, strict=True))}
+
+
+def cheapest(found: Variables, aim: float) -> tuple[float, float, float]:
+    """Tolerance, revolutions and seconds that reach a relative standard error at the least cost by the formula.
+
+    NaN where no tolerance is known to be off by less than the aim.
+    """
+    off, doubt = found["tolerance_bias"], found["tolerance_bias_error"]
+    bias = _known_bias(off, doubt)
+    doubtful = np.nan_to_num(np.abs(off)) + 2.0 * np.nan_to_num(doubt) > aim
+    left = np.where((bias < aim) & ~doubtful, aim**2 - bias**2, np.nan)
+    spent = np.maximum(found["turn_variance"] / left, 1.0)
+    price = found["tolerance_seconds"] * (spent + COPIES * found["spin_up"])
+    if np.isnan(price).all():
+        return np.nan, np.nan, np.nan
+    best = int(np.nanargmin(price))
+    return float(found["tolerance"][best]), float(np.ceil(spent[best])), float(price[best])
 
 
 def _spin_up(gaps: Array) -> int:
