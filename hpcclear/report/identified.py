@@ -1,5 +1,6 @@
 """What a file of kind ``identify`` says, in lines for the terminal and the page."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,14 @@ def rounded(value: float, unit: str, digits: int = 2) -> str:
     return f"{text} {scale.unit}" if scale.unit != "–" else text
 
 
-def lines(content: Results) -> list[Line]:
-    """Return what was identified: unknowns by record, fit, growth, and what to measure."""
-    found = _records(content) if "interval" in content else []
-    return [*found, *_growth(content), *_advice(content)]
+def lines(content: Results) -> Iterator[Line]:
+    """Yield what was identified: unknowns by record, fit, growth, and what to measure."""
+    if "interval" in content:
+        yield from _records(content)
+    if "rate" in content:
+        yield from _growth(content)
+    if "expected_half_width" in content:
+        yield from _advice(content)
 
 
 def short(name: object) -> str:
@@ -45,20 +50,18 @@ def named(name: object) -> str:
     return kind + short(name)
 
 
-def _records(content: Results) -> list[Line]:
-    found = []
+def _records(content: Results) -> Iterator[Line]:
     for k, record in enumerate(content["record"].values):
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].values):
-            found.append(Line(named(name), before + interval(content, k, u)))
+            yield Line(named(name), before + interval(content, k, u))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
-            found.append(Line("together", before + _together(content, k)))
+            yield Line("together", before + _together(content, k))
         share, factor = (content[name].values[k] for name in ("coverage", "widening"))
         shown = " and ".join(f"{100 * one:.0f} %" for one in share)
         wider = " and ".join(f"{one:.2g}" for one in factor)
         text = f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
-        found.append(Line("calibration", before + text))
-    return found
+        yield Line("calibration", before + text)
 
 
 def _together(content: Results, record: int) -> str:
@@ -100,17 +103,14 @@ def interval(content: Results, record: int, unknown: int) -> str:
     return f"{rounded(middle, unit, digits)} (95 % interval {ends})"
 
 
-def _growth(content: Results) -> list[Line]:
-    if "rate" not in content:
-        return []
-    found, used = [], int(content["explained"].values.sum())
-    every = content.sizes["record"]
+def _growth(content: Results) -> Iterator[Line]:
+    used, every = int(content["explained"].values.sum()), content.sizes["record"]
     of = f", from the {used} of {every} records that the model explains" if used < every else ""
     for u, name in enumerate(content["unknown"].values):
         unit = str(content["unit"].values[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
         text = f"{middle} per day (95 % interval {low} to {high}){of}"
-        found.append(Line(f"growth, {named(name)}", text))
+        yield Line(f"growth, {named(name)}", text)
         if "limit" in content.attrs:
             days = [
                 f"{rounded(float(one) / DAY, '1')} days" if np.isfinite(one) else "never"
@@ -118,14 +118,10 @@ def _growth(content: Results) -> list[Line]:
             ]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
-            found.append(Line(f"time to {limit}, {named(name)}", text))
-    return found
+            yield Line(f"time to {limit}, {named(name)}", text)
 
 
-def _advice(content: Results) -> list[Line]:
-    if "expected_half_width" not in content:
-        return []
-    found = []
+def _advice(content: Results) -> Iterator[Line]:
     counts = content["revolutions"].values
     for k, name in enumerate(content["candidate"].values):
         parts = []
@@ -138,21 +134,18 @@ def _advice(content: Results) -> list[Line]:
         if len(parts) > 1:
             related = float(content["expected_correlation"][k, -1])
             parts.append(f"correlation of errors {related:.2f} ({counts[-1]})")
-        found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
-    return found
+        yield Line(f"by {name}", f"{'; '.join(parts)} revolutions")
 
 
-def warnings(content: Results) -> list[str]:
-    """Return what makes a result doubtful."""
-    found = []
+def warnings(content: Results) -> Iterator[str]:
+    """Yield what makes a result doubtful."""
     for k, record in enumerate(content["record"].values if "record" in content else ()):
         doubt = float(content["doubt"][k])
         worst = str(content["feature"].values[int(content["worst_feature"][k])])
         if not int(content["explained"][k]):
             text = f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "
-            found.append(f"{text}least is the {worst}. Check the scene, the sensor and the bounds")
+            yield f"{text}least is the {worst}. Check the scene, the sensor and the bounds"
         related = float(content["correlation"][k])
         if abs(related) > TOGETHER:
             text = f"the unknowns are not identified separately from {record}: their largest correlation is "
-            found.append(f"{text}{related:.2f}")
-    return found
+            yield f"{text}{related:.2f}"

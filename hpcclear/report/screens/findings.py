@@ -19,7 +19,6 @@ MOST = 4
 
 def machine(found: Results, content: Content) -> Screen:
     """Return the first screen of an identified machine."""
-    lines = identified.lines(found)
     known = "interval" in found
     trust = [Trust.red(upper(text), "identify") for text in identified.warnings(found)]
     if known and not trust:
@@ -40,7 +39,7 @@ def machine(found: Results, content: Content) -> Screen:
         for label, text in unknown
     ]
     above = {label.partition(",")[0] for label, _ in unknown if len(unknown) <= MOST}
-    shown = (line for line in lines if line.label not in above | {"calibration"})
+    shown = (line for line in identified.lines(found) if line.label not in above | {"calibration"})
     rows = tuple(ScreenRow(line.label, (line.text,)) for line in shown)
     return Screen(
         headline,

@@ -50,8 +50,11 @@ def screen(lives: Results, content: Content) -> Screen:
 
 def followed(lives: Results) -> Booleans:
     """Return which lives did not fail, (lives,)."""
-    lived = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
-    return np.isin(lives["ending"].values, lived)
+    return np.isin(lives["ending"].values, [int(one) for one in filter(_lived, Status)])
+
+
+def _lived(status: Status) -> bool:
+    return status.valid or status is Status.WORN_THROUGH
 
 
 def _is_limited(lives: Results) -> bool:
@@ -119,51 +122,36 @@ def _trust(lives: Results) -> Iterator[Trust]:
 def _failed(lives: Results) -> list[str]:
     """How many lives failed with each status, and the remedy."""
     codes = lives["ending"].values
-    statuses = [one for one in Status if not one.valid and one is not Status.WORN_THROUGH]
     return [
         f"{count} of {len(codes)} lives {status.name.lower()}: {status.message}. {status.remedy}"
-        for status in statuses
-        if (count := int((codes == status).sum()))
+        for status in Status
+        if not _lived(status) and (count := int((codes == status).sum()))
     ]
 
 
-def doubts(content: Results) -> list[str]:
-    """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
+def doubts(content: Results) -> Iterator[str]:
+    """Yield warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
     state."""
-    texts = []
-    unsure = int((content["flags"].values == Flag.TARGET_MISSED).sum())
-    if unsure:
-        texts.append(
-            f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
-        )
+    if unsure := int((content["flags"].values == Flag.TARGET_MISSED).sum()):
+        yield f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
     drift = content["drift"].values
-    moving = int((drift > content.attrs["tolerance"]).sum())
-    if moving:
+    if moving := int((drift > content.attrs["tolerance"]).sum()):
         count = f"{moving} service {'life' if moving == 1 else 'lives'}"
-        texts.append(
-            f"{count} had not reached steady state ({100 * drift.max():.1f} % change with a longer transient); "
-            "raise numerics.transient_revolutions"
-        )
-    if "sharpest" in content:
-        narrow = int((content["sharpest"].values > 1.0).sum())
-        if narrow:
-            texts.append(
-                f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "
-                "lower wear.harmonics"
-            )
-    return texts
+        change = f"{100 * drift.max():.1f} % change with a longer transient"
+        yield f"{count} had not reached steady state ({change}); raise numerics.transient_revolutions"
+    if "sharpest" in content and (narrow := int((content["sharpest"].values > 1.0).sum())):
+        text = f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges"
+        yield f"{text}; lower wear.harmonics"
 
 
 def section(lives: Results, content: Content) -> list[object]:
     """What is known of service lives besides the first screen, in lines."""
     if not followed(lives).any():
         return []
-    reasons = lives["end_reason"].values
-    rows: list[list[object]] = []
-    for name, words in REASONS.items():
-        if count := int((reasons == name).sum()):
-            rows.append(["ended", f"{count} {words}"])
-    rows += [*_lifetimes(lives), *_profiles(lives)]
+    reasons = lives["end_reason"].values.tolist()
+    ends = ((reasons.count(name), words) for name, words in REASONS.items())
+    ended = [["ended", f"{count} {words}"] for count, words in ends if count]
+    rows = [*ended, *_lifetimes(lives), *_profiles(lives)]
     return [PageTable(["quantity", "result"], rows, "Service lives")]
 
 
@@ -195,14 +183,15 @@ def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str
     return shown
 
 
-def _lifetimes(lives: Results) -> list[list[object]]:
+def _lifetimes(lives: Results) -> Iterator[list[str]]:
     """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
     cycles, last = float(lives["cycle"][-1]), lives.isel(cycle=-1)
     each, followed = lives["revolution_time"].values / HOUR, lives["ended"].values
     text = f"at most {followed.max():.4g} revolutions, or {(followed * each).max():.4g} h"
-    rows: list[list[object]] = [["simulated", text]]
+    yield ["simulated", text]
     if not _is_limited(lives):
-        return [*rows, ["service life", "no threshold given (wear.limit)"]]
+        yield ["service life", "no threshold given (wear.limit)"]
+        return
     for name, unit, beyond in (
         ("lifetime", "revolutions", cycles),
         ("lifetime_hours", "h", float((cycles * each).min())),
@@ -212,33 +201,30 @@ def _lifetimes(lives: Results) -> list[list[object]]:
             for value, low, high in spread(lives, name, beyond)
         ]
         text = "median {}; 5th percentile {}; 95th percentile {}".format(*texts)
-        rows.append([f"service life, {unit}", text])
+        yield [f"service life, {unit}", text]
     for name in lives["joint"].values if "exceedance" in lives else ():
         one = last.sel(joint=name)
         low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])
         text = f"{float(one['exceedance']):.3g} (95 % CI {low:.3g} to {high:.3g})"
-        rows.append([f"P(clearance {name} > limit)", text])
-    return rows
+        yield [f"P(clearance {name} > limit)", text]
 
 
-def _profiles(lives: Results) -> list[list[object]]:
+def _profiles(lives: Results) -> Iterator[list[str]]:
     """Wear where surfaces touch: the largest clearance around, and lives, beside uniform wear."""
     if "local_clearance" not in lives:
-        return []
-    rows: list[list[object]] = []
+        return
     for k, name in enumerate(lives["joint"].values):
         largest = quantity(float(np.nanmedian(lives["end_clearance"][:, k])), "m")
         even = lives["even_clearance"].isel(cycle=-1).sel(joint=name).values
         known = np.isfinite(even).all()
         beside = f"; {quantity(float(np.median(even)), 'm')} with uniform wear" if known else ""
-        rows.append([f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"])
+        yield [f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"]
     if _is_limited(lives):
         cycles, parts = float(lives["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):
             value = float(lives[name].sel(quantile=0.5))
             parts.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-        rows.append(["median service life", f"{parts[0]}; {parts[1]} with uniform wear"])
-    return rows
+        yield ["median service life", f"{parts[0]}; {parts[1]} with uniform wear"]
 
 
 def _inputs(lives: Results) -> Iterator[tuple[str, str, float]]:
