@@ -17,9 +17,9 @@ from hpcclear.base.student import student
 from hpcclear.base.units import to_si
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
+from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results, texts_in
 from hpcclear.results.names import KINDS
-from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.study_tables import DRAWN
 from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
 
@@ -92,7 +92,8 @@ def beyond(units: Mapping[str, str], words: str, joints: Sequence[str] = ()) -> 
     with suppress(ValueError):
         plain = float(text)
     if np.isfinite(plain) and unit:
-        remedy = f'Write it with a unit that fits {unit}, such as "{text} {_usual(unit)}"'
+        usual = {"m": "mm", "N": "kN", "Pa": "MPa"}.get(unit, unit)
+        remedy = f'Write it with a unit that fits {unit}, such as "{text} {usual}"'
         raise InputError("--beyond", words, "the value has no unit", remedy)
     if np.isfinite(plain):
         return Beyond(name, plain, joint)
@@ -102,11 +103,6 @@ def beyond(units: Mapping[str, str], words: str, joints: Sequence[str] = ()) -> 
 
 def _of_joints(name: str) -> bool:
     return name in FIELDS and "joint" in FIELDS[name].per
-
-
-def _usual(unit: str) -> str:
-    """A unit that people write for one of SI."""
-    return {"m": "mm", "N": "kN", "Pa": "MPa"}.get(unit, unit)
 
 
 def units_of(objective: Objective) -> dict[str, str]:
@@ -149,12 +145,9 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
 def in_time(samples: Results) -> list[Line]:
     """Return how well f is known in each sample: its half-width, and its standard deviation between revolutions."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
-    f, remedy = (
-        np.abs(samples["objective"].values),
-        "set numerics.target_error for one of each sample",
-    )
-    if "objective" in samples.attrs:
-        remedy = "a response has one (hpcclear simulate)"
+    f, remedy = np.abs(samples["objective"].values), "a response has one (hpcclear simulate)"
+    if "objective" not in samples.attrs:
+        remedy = "set numerics.target_error for one of each sample"
     lines, columns = [], {"half-width of f": name, "cycle-to-cycle std. dev.": "objective_spread"}
     for label, column in columns.items():
         parts = samples[column].values / f if column in samples else np.array([])
@@ -214,13 +207,10 @@ def remarks(samples: Results) -> list[str]:
 
 def _length_of_peaks(samples: Results) -> list[Line]:
     """Of how many revolutions each peak is the largest, since it grows with their number."""
-    try:
-        numerics = scene_of_text(str(samples.attrs.get("scene", "")), "scene").numerics
-    except InputError:
+    scene = scene_of(samples)
+    if scene is None or scene.numerics.target_error is not None:
         return []
-    if numerics.target_error is not None:
-        return []
-    count = numerics.averaged_revolutions
+    count = scene.numerics.averaged_revolutions
     return [Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")]
 
 

@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
-from hpcclear.scene.loading import scene_of_text
 
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Relative errors of f that are put in words."""
@@ -98,9 +97,8 @@ def settings(found: Results) -> Way | None:
     None if the file does not have them as numbers, the panel of averaging is not there, or their tolerance is not between
     those that were measured.
     """
-    try:
-        scene = scene_of_text(str(found.attrs["scene"]), "scene")
-    except (InputError, KeyError):
+    scene = scene_of(found)
+    if scene is None:
         return None
     numerics = scene.numerics
     if numerics.target_error is not None:

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.written import reading
 from hpcclear.report.figures import curves, drawing, labels, motion, moving, style
 from hpcclear.report.figures.placed import Pose
+from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -105,13 +105,8 @@ def _posed(response: Results) -> tuple[Scene, dict[str, Pose]]:
 
 def differences(response: Results, before: Results) -> dict[str, list[str]]:
     """`changes` of the scenes of two responses; none where a file does not hold its scene whole."""
-    texts = [str(one.attrs.get("scene", "")) for one in (response, before)]
-    if texts[0] == texts[1]:
-        return {}
-    try:
-        return changes(*(scene_of_text(text, "scene") for text in texts))
-    except InputError:
-        return {}
+    new, old = map(scene_of, (response, before))
+    return {} if new is None or old is None or new is old else changes(new, old)
 
 
 def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:
