@@ -172,6 +172,7 @@ def solve_turn(
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     end = np.inf if one.free else period
     limit = 20.0 * period if one.free else end
+    turn_end = float(one.named.turn_end)
     atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
     atol = np.append(atol, one.size * [rtol * 1e-3 * period])
     t, y, peak, count = 0.0, start, 0.0, 0
@@ -179,7 +180,7 @@ def solve_turn(
         gaps = here.joints(t, y)[:, OPEN].copy()
         events = [_crossing(here, j, side[j], gaps[j]) for j in joints]
         if one.free:
-            events.append(_full_turn(one.n, float(one.named.turn_end)))
+            events.append(_event(lambda time, y: float(y[one.n - 1] - turn_end), 1.0))
         piece = solve_ivp(
             here, (t, limit), y, solver, rtol=rtol, atol=atol, events=events, dense_output=True,
             max_step=period / 64.0,  # a whole contact inside a step would go unnoticed
@@ -205,10 +206,6 @@ def _crossing(one: CalledEquations, joint: int, side: float, at_start: float) ->
     """The event that a gap leaves its side of zero; right after the last event it is taken to be on it."""
     shift = 2.0 * at_start if side * at_start < 0.0 else 0.0
     return _event(lambda time, y: float(one.joints(time, y)[joint, OPEN]) - shift, -side)
-
-
-def _full_turn(n: int, end: float) -> Event:
-    return _event(lambda time, y: float(y[n - 1] - end), 1.0)
 
 
 def _event(value: Event, direction: float) -> Event:

@@ -200,11 +200,8 @@ def _ranged(scene: Scene, one: StudyVariable) -> str:
         names = [row.name for row in one.rows]
         listed = names or [scene.in_unit(value, one.unit) for value in one.values or ()]
         weights = one.over if one.over not in (None, "worst") else ()
-        how = (
-            f"weights {', '.join(f'{float(w):g}' for w in weights)}"
-            if weights
-            else "f of the worst"
-        )
+        shares = ", ".join(f"{float(weight):g}" for weight in weights)
+        how = f"weights {shares}" if weights else "f of the worst"
         loads = "" if one.over is None else f" (load cases, {how})"
         return f"{', '.join(listed)}: {one.words}{loads}"
     if one.range is not None:

@@ -95,10 +95,9 @@ def torque(response: Results) -> Torque:
     both = (response[name].values[inside] for name in ("driving_work", "crank_angle"))
     work, angle = (float(one[-1] - one[0]) for one in both)
     swings = abs(angle) < 0.5 * np.ptp(motion.phase(response)[inside])
-    scene = (
-        scene_of(response) if "drive_phase" in response else None
-    )  # a slider-crank has one drive
-    single = "drive_phase" not in response or (scene and len(scene.linkage.drives) == 1)
+    single = "drive_phase" not in response  # a slider-crank has one drive
+    if not single and (scene := scene_of(response)):
+        single = len(scene.linkage.drives) == 1
     if swings or angle == 0.0 or not single:
         return Torque(peak, np.nan)
     mean = work / angle

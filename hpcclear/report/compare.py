@@ -212,13 +212,11 @@ def _check_names(names: Mapping[str, str], columns: list[SheetColumn]) -> None:
 
 def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
     """Kind and column of what a table runs along: the first, where it has time and angle."""
-    for axis in sheet.axes.items():
-        return axis
-    reason, remedy = (
-        "the first column is neither time nor angle",
-        'Call it "time [s]" or "crank_angle [deg]"',
-    )
-    raise InputError("heading", sheet.columns[0].heading, reason, remedy)
+    if not sheet.axes:
+        reason = "the first column is neither time nor angle"
+        remedy = 'Call it "time [s]" or "crank_angle [deg]"'
+        raise InputError("heading", sheet.columns[0].heading, reason, remedy)
+    return next(iter(sheet.axes.items()))
 
 
 def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:

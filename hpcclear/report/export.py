@@ -8,7 +8,7 @@ import re
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -151,11 +151,17 @@ def _csv(table: "DataFrame") -> Written:
 
 
 def _parquet(table: "DataFrame") -> Written:
-    arrow, parquet = _arrow()
-    made = arrow.Table.from_pandas(table, preserve_index=False)
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ModuleNotFoundError:
+        reason = "parquet files need the package pyarrow, which is not installed"
+        remedy = f"{installing('tables')}; csv, xlsx and mat need nothing"
+        raise InputError("output", "parquet", reason, remedy) from None
+    made = pyarrow.Table.from_pandas(table, preserve_index=False)
     about = {key: json.dumps(value) for key, value in table.attrs.items()}
     buffer = io.BytesIO()
-    with parquet.ParquetWriter(buffer, made.schema, store_schema=False) as writer:
+    with pyarrow.parquet.ParquetWriter(buffer, made.schema, store_schema=False) as writer:
         writer.write_table(made)
         writer.add_key_value_metadata({**about, "generator": "written by hpcclear"})
     return buffer.getvalue(), b"written by hpcclear"
@@ -239,18 +245,6 @@ def _book(sheets: Mapping[str, Iterable[Sequence[object]]]) -> bytes:
     with zipfile.ZipFile(buffer, "a") as archive:
         archive.comment = BOOK_MARK
     return buffer.getvalue()
-
-
-def _arrow() -> tuple[Any, Any]:
-    """The modules pyarrow and pyarrow.parquet; InputError with the extra that brings them."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ModuleNotFoundError:
-        kind, reason = "parquet", "parquet files need the package pyarrow, which is not installed"
-        remedy = f"{installing('tables')}; csv, xlsx and mat need nothing"
-        raise InputError("output", kind, reason, remedy) from None
-    return pyarrow, pyarrow.parquet
 
 
 FORMATS = {".csv": _csv, ".xlsx": _xlsx, ".mat": _mat, ".parquet": _parquet}

@@ -284,11 +284,8 @@ def draw(sheet: SheetContent) -> "style.Figure":
         axes = figure.add_axes(box)
         axes.imshow(image, aspect="auto", interpolation="none")
         axes.set_axis_off()
-        look, heights = (
-            (SIZES[-1], _Cell("", _SOFT)),
-            top + high + 1.0 + step * np.arange(len(lines)),
-        )
-        placed += [(x, y, look[0], line, look[1]) for y, line in zip(heights, lines, strict=True)]
+        y, soft = top + high + 1.0, _Cell("", _SOFT)
+        placed += [(x, y + step * n, SIZES[-1], line, soft) for n, line in enumerate(lines)]
     for k, word in enumerate(("Name", "Date", "Signature")):
         x = MARGIN + k * (INNER + GAP) / 3.0
         ends, height = [x / WIDTH, (x + (INNER - 2.0 * GAP) / 3.0) / WIDTH], MARGIN + 3.5

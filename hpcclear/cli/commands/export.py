@@ -48,10 +48,8 @@ def run(
         console().print(tabled("", rows_of(lines), ["statistic", *samples]))
     else:
         if len(files) > 1 or beyond:
-            reason, remedy = (
-                "a table holds one result",
-                "Add --statistics, or export each by itself",
-            )
+            reason = "a table holds one result"
+            remedy = "Add --statistics, or export each by itself"
             raise InputError("export", f"{len(files)} files", reason, remedy)
         table = writing.export(files[0], cli.place_of(output), units)
         if left := list(table.attrs["left_out"]):

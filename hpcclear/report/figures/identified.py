@@ -82,10 +82,8 @@ def growth_figure(identify: Results) -> "style.Figure":
     Raises InputError where there is one record only, or none has a date."""
     _check(identify)
     if "rate" not in identify:
-        reason, remedy = (
-            "growth needs two records with dates",
-            "Give a --signal and a --date for each",
-        )
+        reason = "growth needs two records with dates"
+        remedy = "Give a --signal and a --date for each"
         raise InputError("identify", 1, reason, remedy)
     count, days = identify.sizes["unknown"], identify["elapsed"].values / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)

@@ -117,16 +117,11 @@ def designs(verified: Results, content: Content) -> list[object]:
         if each and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
     ]
     if not named:
-        every = {name: name for name in names_in(verified)}
+        every = {name: name for name in texts_in(verified, "design")}
         tables = [table_of(verified, every, SIMULATED, "Designs")]
     remarks = str(verified.attrs.get("remarks", "none"))
     parts: list[object] = [_WORDS, *tables, *([remarks] if remarks != "none" else [])]
     return parts
-
-
-def names_in(verified: Results) -> list[str]:
-    """Return the names of all designs."""
-    return texts_in(verified, "design")
 
 
 def table_of(
@@ -139,7 +134,8 @@ def table_of(
     known = [(v, words) for v, words in known if bool(np.isfinite(v).any())]
     scales = [labels.of(variable) for variable, _ in known]
     header = ["design", *(s.label(words) for s, (_, words) in zip(scales, known, strict=True))]
-    asked = [] if is_plain(chosen.isel(design=0)) else _objectives(chosen)
+    plain = is_plain(chosen.isel(design=0))
+    asked = [name for name in ORDINALS if not plain and f"{name}_goal" in chosen]
     if asked:  # each case has its own, so the cells say what it is
         header += [*(f"objective {k + 1}" for k in range(len(asked))), "constraints"]
     rows = []
@@ -152,10 +148,6 @@ def table_of(
             row.append(Number(_cell(chosen.isel(design=k), str(variable.name), scale)))
         rows.append([*row, *_goals(chosen.isel(design=k), asked)])
     return PageTable(header, rows, caption)
-
-
-def _objectives(verified: Results) -> list[str]:
-    return [name for name in ORDINALS if f"{name}_goal" in verified]
 
 
 def _goals(one: Results, names: Sequence[str]) -> list[object]:
