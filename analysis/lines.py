@@ -57,7 +57,7 @@ FEATURES = {
         "laws/geometry/* dynamics/contacts/roundness.py scene/surfaces.py",
     "impact and noise, loads on bearings":
         "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
-        "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
+        "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/html/loads.py "
         "study/simulations.py scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",

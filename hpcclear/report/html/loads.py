@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hpcclear.base.outcome import Regime, Status
-from hpcclear.report import bearings, noise
-from hpcclear.report.figures import labels, motion
+from hpcclear.report import bearings
+from hpcclear.report.figures import labels, motion, noise
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, quantity
 from hpcclear.report.merit import recommended
