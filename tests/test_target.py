@@ -15,7 +15,7 @@ from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
 from hpcclear.cli.printing import describe_response
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluation.steady import procedure
+from hpcclear.dynamics.evaluation.steady import ensemble
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.setup.parameters import parameters
@@ -115,7 +115,7 @@ def test_a_chaotic_motion_whose_speed_still_moves_is_not_called_met():
 
 
 def test_a_looser_tolerance_that_is_off_is_given_up_and_the_stricter_kept(monkeypatch):
-    monkeypatch.setattr(procedure, "LOOSEST", 1e-3)  # where this motion is off by 0.3 %
+    monkeypatch.setattr(ensemble, "LOOSEST", 1e-3)  # where this motion is off by 0.3 %
     found = record(CHAOTIC, 5e-4, target_revolutions=60_000)
     assert found["steady_rtol"] <= 1.01e-5
     mean, error = truth(True)

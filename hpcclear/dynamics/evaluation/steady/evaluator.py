@@ -13,8 +13,8 @@ from hpcclear.dynamics.evaluation import evaluator
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.copies import scales
 from hpcclear.dynamics.evaluation.steady.effort import Mean, Sample, Segment
+from hpcclear.dynamics.evaluation.steady.ensemble import steady_mean
 from hpcclear.dynamics.evaluation.steady.judging import objective
-from hpcclear.dynamics.evaluation.steady.procedure import steady_mean
 from hpcclear.dynamics.layout.views import Outcome, Start
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.parameters import parameters
@@ -139,7 +139,9 @@ class SteadyEvaluator:
         for kind, group in by_kind.items():
             par = np.concatenate([ask.segment.par for ask in group])
             start = Start(np.concatenate([ask.segment.start.rows for ask in group]))
-            self._lanes_of(*kind).queue(par, start, np.concatenate([*map(_labels, group)]))
+            copies = [np.arange(len(ask.segment.start)) for ask in group]
+            labels = [_MOST_COPIES * ask.sample + k for ask, k in zip(group, copies, strict=True)]
+            self._lanes_of(*kind).queue(par, start, np.concatenate(labels))
 
     def advance(self, seconds: float) -> Records:
         """Work for about `seconds`; return the records of the designs that finished meanwhile."""
@@ -174,10 +176,6 @@ class SteadyEvaluator:
 
 
 _MOST_COPIES = 1 << 20
-
-
-def _labels(ask: _Ask) -> Integers:
-    return ask.sample * _MOST_COPIES + np.arange(len(ask.segment.start))
 
 
 _PEAKS = {"peak_contact_force", "peak_crank_moment", "peak_point_acceleration"}
