@@ -73,9 +73,10 @@ _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"standard deviation $\sigm
 def _goals(one: Results) -> list[_Goal]:
     """What a case makes small, from its part of the fronts."""
     asked = searched(one)
-    if len(asked) < 2:
-        return [_moment(one, *row) for row in _LETTERS]
-    return [_asked(one, name, *row) for name, row in asked.items()]
+    if len(asked) > 1:
+        return [_asked(one, name, *row) for name, row in asked.items()]
+    usual = ((name, words, labels.of(one[name])) for name, words in _LETTERS)
+    return [_Goal(unit.label(words), name, name, unit) for name, words, unit in usual]
 
 
 def searched(one: Results) -> dict[str, tuple[str, str]]:
@@ -84,11 +85,6 @@ def searched(one: Results) -> dict[str, tuple[str, str]]:
     names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
     every = {n: (text_in(one, f"{n}_goal"), text_in(one, f"{n}_unit")) for n in names}
     return {name: row for name, row in every.items() if row[0]}
-
-
-def _moment(one: Results, name: str, words: str) -> _Goal:
-    unit = labels.of(one[name])
-    return _Goal(unit.label(words), name, name, unit)
 
 
 def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:

@@ -1,7 +1,6 @@
 """The page's section on designs: those that a reader compares, each once, then the rest folded."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +18,9 @@ LIGHTER = 0.01
 """Relative difference of the varied masses above which another design is called the lightest."""
 
 
-class Role(NamedTuple):
-    """A design of a case, and what it is."""
-
-    design: str
-    """Name in the files."""
-    words: str
-    """Its roles: "baseline", "lowest mean (alpha), recommended"."""
-
-
-def roles(verified: Results) -> dict[str, list[Role]]:
-    """Return the designs to compare (of kind ``verification``), by case, each distinct design once.
+def roles(verified: Results) -> dict[str, dict[str, str]]:
+    """Return the designs to compare (of kind ``verification``), by case, each distinct design once: their roles ("baseline",
+    "lowest mean (alpha), recommended") by their names in the files.
 
     Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses, unless one of
     these is as light. Intermediate designs of the search are left out.
@@ -50,7 +41,7 @@ def roles(verified: Results) -> dict[str, list[Role]]:
             chosen.setdefault(same, first).append("recommended")
         if light := _lightest(verified, case, list(chosen)):
             chosen[light] = [light.removeprefix(f"{case} "), "lightest"]
-        found[case] = [Role(name, ", ".join(words)) for name, words in chosen.items()]
+        found[case] = {name: ", ".join(words) for name, words in chosen.items()}
     return found
 
 
@@ -110,13 +101,12 @@ _WORDS = "By simulation, ± half-width of the 95 % confidence interval. In brack
 def designs(verified: Results, content: Content) -> list[object]:
     """What was found, a table a case with each distinct design once."""
     shown = roles(verified)
-    named = [one.design for each in shown.values() for one in each]
     tables: list[object] = [
-        table_of(verified, {one.design: one.words for one in each}, SIMULATED, caption)
-        for case, each in shown.items()
-        if each and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
+        table_of(verified, words, SIMULATED, caption)
+        for case, words in shown.items()
+        if words and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
     ]
-    if not named:
+    if not tables:
         every = {name: name for name in texts_in(verified, "design")}
         tables = [table_of(verified, every, SIMULATED, "Designs")]
     remarks = str(verified.attrs.get("remarks", "none"))

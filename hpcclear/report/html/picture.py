@@ -12,9 +12,9 @@ from hpcclear.report.merit import goals_of, leading_goals, recommended
 from hpcclear.report.screens.study import simulated
 from hpcclear.results.content import Results, text_in
 
-_LEGEND = {"design": "simulated", "original": "baseline design", "printed": "design of the paper"}
-_USUAL = ("mean of f", "standard deviation of f")
 _WORDS = {"mean": "mean", "deviation": "standard deviation"}
+_USUAL = tuple(f"{words} of f" for words in _WORDS.values())
+_LEGEND = {"design": "simulated", "original": "baseline design", "printed": "design of the paper"}
 FRAMES = 180  # of a revolution
 POINTS = 720  # of a curve, about
 
@@ -87,17 +87,14 @@ Goal = tuple[str, float, float, float]
 """Unit and value of an objective, and the ends of its confidence interval, NaN where that is not known."""
 
 
-def _usual(one: Results) -> dict[str, Goal]:
-    """Mean and standard deviation of f, which every design has, by their words."""
-    named = zip(_USUAL, ("mean", "deviation"), strict=True)
-    every = ((words, name, str(one[f"{name}_true"].attrs["units"])) for words, name in named)
-    return {words: (unit, *labels.estimate(one, name)) for words, name, unit in every}
-
-
-def _verified(one: Results) -> dict[str, Goal]:
-    """What the case of a design makes small, by simulation: unit and value by its words."""
-    goals = {name: text_in(one, f"{name}_unit") or "1" for name in goals_of(one)}
-    return {text_in(one, f"{n}_goal"): (u, *labels.estimate(one, n)) for n, u in goals.items()}
+def _goals(one: Results) -> dict[str, Goal]:
+    """Mean and standard deviation of f, which every design has, and what its case makes small, by simulation, by their
+    words."""
+    units = {name: str(one[f"{name}_true"].attrs["units"]) for name in _WORDS}
+    every = dict(zip(_USUAL, units.items(), strict=True))
+    for name in goals_of(one):
+        every[text_in(one, f"{name}_goal")] = name, text_in(one, f"{name}_unit") or "1"
+    return {words: (unit, *labels.estimate(one, name)) for words, (name, unit) in every.items()}
 
 
 def _design(one: Results) -> dict[str, Any]:
@@ -111,7 +108,7 @@ def _design(one: Results) -> dict[str, Any]:
         "surrogate": _predicted(one),
         "direct": simulated(one),
         "response": "original" if is_original else name,
-        "goals": _usual(one) | _verified(one),
+        "goals": _goals(one),
     }
 
 
@@ -123,11 +120,11 @@ def _values(one: Results) -> list[list[str]]:
 
 def _predicted(one: Results) -> list[list[str]]:
     """Mean and standard deviation by the surrogate; none where they are not known."""
-    rows = {words: f"{name}_surrogate" for name, words in _WORDS.items()}
+    known = ((words, one.get(f"{name}_surrogate")) for name, words in _WORDS.items())
     return [
-        [words, str(quantity(float(one[name]), str(one[name].attrs["units"])))]
-        for words, name in rows.items()
-        if name in one
+        [words, str(quantity(float(value), str(value.attrs["units"])))]
+        for words, value in known
+        if value is not None
     ]
 
 
