@@ -5,8 +5,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rich.console import Console
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
@@ -16,6 +17,7 @@ from hpcclear.cli.terminal import fitting
 from hpcclear.ranks.terminal import WIDTH
 from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import PageTable
 from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of
 from hpcclear.report.spread import Line
@@ -39,34 +41,33 @@ def describe(
     `asked`: further lines that were requested. `details`: whether all sections of the page follow; by default as the option
     ``--details`` says.
     """
-    with in_units_of(content.attribute("scene")):
-        _describe(content, written, asked, details)
-
-
-def _describe(
-    content: Content, written: Sequence[Path], asked: Sequence[Line], details: bool | None
-) -> None:
     out = console()
     details = detailed() if details is None else details
     files = [f"written  {path}" for path in written if path.exists()]
     more = [line for one in asked for line in _labelled(one.label, one.text)]
-    if (first := screen_of(content)) is not None:
-        for line in [*fitted(first, LINES - len(files) - len(more) - 1), *more]:
-            out.print(line)
-    if details:
-        from hpcclear.report.html.page import sections  # loads all that can be printed
-
-        troubles: list[str] = []
-        for part, parts in sections(content, troubles):
-            out.print(Text(f"\n{part.title}", "bold"))
-            for one in parts:
-                _print(out, one)
-        for text in troubles:
-            out.print(text)
-    elif first is not None and files:
+    with in_units_of(content.attribute("scene")):
+        if (first := screen_of(content)) is not None:
+            for line in [*fitted(first, LINES - len(files) - len(more) - 1), *more]:
+                out.print(line)
+        if details:
+            _print_sections(out, content)
+    if not details and first is not None and files:
         files[-1] += ("    " if len(files[-1]) < 55 else "\n") + "(--details prints all)"
     for place in files:
         out.print(place, soft_wrap=True)
+
+
+def _print_sections(out: Console, content: Content) -> None:
+    """Print all sections of the page."""
+    from hpcclear.report.html.page import sections  # loads all that can be printed
+
+    troubles: list[str] = []
+    for part, parts in sections(content, troubles):
+        out.print(Text(f"\n{part.title}", "bold"))
+        for one in parts:
+            _print(out, one)
+    for text in troubles:
+        out.print(text)
 
 
 def describe_run(
@@ -157,7 +158,7 @@ def _columns(rows: Sequence[Sequence[str]]) -> Iterator[Text]:
             yield from map(Text, textwrap.wrap(line, WIDTH, subsequent_indent="    "))
 
 
-def _print(out: Any, part: object) -> None:
+def _print(out: Console, part: object) -> None:
     """Print a part of a section of the page: a text, a table, text whose lines stay, or parts that are folded there."""
     if isinstance(part, str):
         out.print(fitting(part))
@@ -167,12 +168,9 @@ def _print(out: Any, part: object) -> None:
         if "text" in part:
             out.print(part["text"], soft_wrap=True)
     else:
-        whole: Any = part
+        assert isinstance(part, PageTable)
         header, *rows = (
-            [fitting(_in_words(cell)) for cell in row] for row in (whole.header, *whole.rows)
+            [fitting(str(c["words"] if isinstance(c, Mapping) else c)) for c in row]
+            for row in (part.header, *part.rows)
         )
-        out.print(table(whole.caption, rows, header))
-
-
-def _in_words(cell: Any) -> str:
-    return str(cell["words"] if isinstance(cell, Mapping) else cell)
+        out.print(table(part.caption, rows, header))
