@@ -75,24 +75,14 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
     start.moving *= 1.0 + np.random.default_rng(0).uniform(low, high, start.moving.shape)
     lanes = Lanes(problem, DEFAULT_LANES)
     lanes.step(1)  # without samples it only compiles
+    gaps = np.full((revolutions, copies, MAX_JOINTS), np.nan)
+    alive = np.arange(copies)
     started = time.perf_counter()
-    gaps = gaps_of_revolutions(lanes, par, start, revolutions)
-    seconds = (time.perf_counter() - started) / (revolutions * copies)
-    return gaps[:, np.isfinite(gaps[-1]).all(axis=1)], seconds
-
-
-def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int) -> Array:
-    """Mean gaps of every revolution, shape (revolutions, samples, MAX_JOINTS), m; NaN from a failure on.
-
-    The lanes are empty, of a problem that averages one revolution without a transient; `par` (samples, PARAMETERS).
-    """
-    count = len(par)
-    gaps = np.full((revolutions, count, MAX_JOINTS), np.nan)
-    alive = np.arange(count)
     for revolution in range(revolutions):
         outcome = lanes.run(par[alive], start)
         good = outcome.status == 0
         alive, outcome = alive[good], outcome[good]
         gaps[revolution, alive] = outcome.mean_gap
         start = outcome.end()
-    return gaps
+    seconds = (time.perf_counter() - started) / (revolutions * copies)
+    return gaps[:, np.isfinite(gaps[-1]).all(axis=1)], seconds

@@ -152,15 +152,6 @@ def outside_method(scene: Scene, designs: int, name: str) -> Integrator:
     return Integrator(f"{name} (scipy)", prepare, compiled=False)
 
 
-def _values(
-    scene: Scene, one: CalledEquations, y: Array, duration: float, peak: float
-) -> tuple[float, float, float, float]:
-    n = one.n
-    f = float(objective(y[2 * n :])) / duration
-    here = scene.with_({"numerics.formulation": "minimal"})
-    return *end_of(here, one.par, y[:n], y[n : 2 * n]), peak, f
-
-
 def solve_turn(
     scene: Scene, one: CalledEquations, solver: str, rtol: float
 ) -> tuple[tuple[float, ...], int]:
@@ -192,7 +183,9 @@ def solve_turn(
         if piece.status < 0:
             return (np.nan,) * 4, count
         if piece.status == 0 or len(joints) in hit:  # the event after those of the joints
-            return _values(scene, one, y, t, peak), count
+            here_too = scene.with_({"numerics.formulation": "minimal"})
+            place = end_of(here_too, one.par, y[: one.n], y[one.n : 2 * one.n])
+            return (*place, peak, float(objective(y[2 * one.n :])) / t), count
         for j in (joints[k] for k in hit):
             side[j] = -side[j]
             if here.latched:

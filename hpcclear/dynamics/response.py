@@ -76,7 +76,8 @@ def simulated(
     scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
 ) -> Results:
     """Simulate a scene as `simulate` does; the content of its file."""
-    steady = _steady(scene)
+    averaged = scene.numerics.target_error is not None and scene.clearance_joints()
+    steady = evaluate_records(scene, steps.ITSELF) if averaged else None
     named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
     if coordinate_count(scene) == 0:
@@ -212,13 +213,6 @@ _REPORTED = (
 
 SPUN_UP, SHOWN = 20, 10
 """Revolutions before those that a response with a target error is averaged over, and of these, at most."""
-
-
-def _steady(scene: Scene) -> Records | None:
-    """The record (1,) of the steady mean, where the scene names a target error; None: it requires a segment."""
-    if scene.numerics.target_error is None or not scene.clearance_joints():
-        return None
-    return evaluate_records(scene, steps.ITSELF)
 
 
 def _shown(scene: Scene, steady: Records) -> Scene:

@@ -113,10 +113,8 @@ Part = TypeVar("Part", FigureOf, SectionOf, LinesOf)
 
 @cache
 def _all() -> tuple[object, ...]:
-    names = (
-        one.name for one in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}.")
-    )
-    modules = [vars(import_module(name)) for name in names]
+    found = pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}.")
+    modules = [vars(import_module(one.name)) for one in found]
     figures = (getattr(one, "declared", None) for own in modules for one in own.values())
     return (*(part for own in modules for part in own.get("PARTS", ())), *figures)
 

@@ -128,10 +128,8 @@ class Screen:
         """Return figures and design in rows, heads first: one table where both stand beside today's, else one each."""
         if self.header[1:2] == ("today",):
             tiles = ((t.label, t.before, t.value, t.within, t.change) for t in self.tiles)
-            ends = (
-                f"at its {row.span.bound} bound" if row.span and row.span.bound else ""
-                for row in self.rows
-            )
+            bounds = [row.span.bound if row.span else "" for row in self.rows]
+            ends = (bound and f"at its {bound} bound" for bound in bounds)
             design = zip(self.rows, ends, strict=True)
             rows = [(row.label, *row.cells, end, "") for row, end in design]
             return [[("", *self.header[1:], "95 %, note", "change"), *tiles, *rows]]

@@ -57,7 +57,18 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
     elastic = stored_energy(scene, par, gaps, active, joints)
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
     strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
-    stored = (kinetic, elastic, potential - strain, strain)
+    unbent = potential - strain
+    driving, _, dissipated, load = seen.works.T
+    balance = {
+        "kinetic_energy": kinetic,
+        "elastic_energy": elastic,
+        "potential_energy": unbent,
+        "driving_work": driving,
+        "load_work": load,
+        "dissipated_energy": dissipated,
+        # its value at the start has to be taken off
+        "energy_residual": kinetic + elastic + unbent + strain - driving - load + dissipated,
+    }
     phase = _phase(scene, linkage, par, seen)
     places = bodies_and_points(mechanism, pose, {k: one.shorter for k, one in bent.items()})
     gained = np.array([linkage.gained(body.name) for body in mechanism.bodies])
@@ -86,7 +97,7 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
         **{name: at_places(scene, columns) for name, columns in of_joints.items()},
         "crank_moment": seen.rates.drive_moment,
         **frame,
-        **balance_series(stored, seen.works),
+        **balance,
         **modal,
         **guide_series(mechanism, pose),
         **held,
@@ -153,28 +164,6 @@ def violation(linkage: Linkage, q: Array, v: Array, time: Array) -> Array:
     joints = [owner.startswith("joints.") for owner in loops.owners]
     error = loops.at(q, v, time).error * (loops.length / loops.row_scales)[:, None]
     return np.abs(error[joints]).max(axis=0, initial=0.0)
-
-
-def balance_series(
-    stored: tuple[Array, Array, Array, Array | float], works: Array
-) -> dict[str, Array]:
-    """Series of the energy balance, J, and what it does not close by, from which its value at the start has to be taken.
-
-    `stored`: kinetic energy, that of contacts, that of gravity and springs, and that of bent bars. `works` (t, 4): done
-    by drives, its absolute value, dissipated, and done by loads.
-    """
-    kinetic, elastic, potential, strain = stored
-    driving, _, dissipated, load = works.T
-    total = kinetic + elastic + potential + strain
-    return {
-        "kinetic_energy": kinetic,
-        "elastic_energy": elastic,
-        "potential_energy": potential,
-        "driving_work": driving,
-        "load_work": load,
-        "dissipated_energy": dissipated,
-        "energy_residual": total - driving - load + dissipated,
-    }
 
 
 def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:

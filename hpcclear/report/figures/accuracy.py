@@ -15,14 +15,8 @@ MARGIN = 100.0
 AIM = 0.01
 """Relative standard error whose cheapest tolerance is marked."""
 
-_WORDS = {
-    "slider_position": "slider position",
-    "slider_velocity": "slider velocity",
-    "body_position": "body position",
-    "body_velocity": "body velocity",
-    "peak_contact_force": "contact-force peak",
-    "objective": "objective $f$",
-}
+_WORDS = {"peak_contact_force": "contact-force peak", "objective": "objective $f$"}
+"""What quantities are called besides their names."""
 
 
 def _foot(figure: "style.Figure", found: Results, sentence: str = "", *about: str) -> None:
@@ -70,7 +64,8 @@ def integration_figure(accuracy: Results) -> "style.Figure":
         here = accuracy.sel(quantity=quantity)
         for column, work in enumerate(("seconds", "evaluations")):
             _ladder(axes[row, column], here, work)
-        axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)} relative error (–)")
+        words = _WORDS.get(quantity, quantity.replace("_", " "))
+        axes[row, 0].set_ylabel(f"{words} relative error (–)")
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
     style.legend(figure, axes[0, 0], "upper")

@@ -121,7 +121,8 @@ class Lettering:
             return False
         feet, middle, room = best
         for place, foot in zip(places, feet, strict=True):
-            self.line([place, foot + 2.0 * _unit(foot - place) / self.per_m], "grey", 0.4)
+            beyond = 2.0 * (foot - place) / (float(np.hypot(*(foot - place))) or 1.0)
+            self.line([place, foot + beyond / self.per_m], "grey", 0.4)
         self.arrow(feet[0], feet[1], "ink", "<->" if room else "-", 0.5)
         if not room:  # arrows from outside, as the words do not fit between
             for foot, way in ((feet[0], along), (feet[1], -along)):
@@ -184,8 +185,3 @@ def _sampled(corners: Array) -> Array:
         count = 2 + int(np.hypot(*(end - start)) / _STEP)
         parts.append(np.linspace(start, end, count))
     return np.vstack(parts)
-
-
-def _unit(way: Array) -> Array:
-    length = float(np.hypot(*way))
-    return way / length if length > 0.0 else way

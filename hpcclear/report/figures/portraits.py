@@ -42,11 +42,15 @@ def orbit_figure(response: Results) -> "style.Figure":
 @style.figure("response", "force-direction", "contact force by its direction", 20)
 def force_polar_figure(response: Results) -> "style.Figure":
     """Contact force over its direction in the fixed frame, over the same revolutions as `orbit_figure`."""
+    from matplotlib.colors import ListedColormap
+
     shown = motion.steady(response)
     joints = motion.joints(shown)
     polar = {"projection": "polar"}
     figure, axes = style.grid(len(joints), 1, 0.97 * style.across() * len(joints), subplot_kw=polar)
     force = labels.of(shown["contact_force"])
+    # colours for an angle: the ends meet, and none is as light as the page
+    cyclic = ListedColormap(style.matplotlib().colormaps["twilight"](np.linspace(0.13, 0.87, 256)))
     angle, sense = motion.crank_angle(shown)
     turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
@@ -54,7 +58,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
         radius = force(shown["contact_force"].sel(joint=joint))
         contact = radius > 0.0
         colour = np.mod(turn, 1.0)[contact] * 360.0
-        look: style.Look = {"s": 3.0, "cmap": _cyclic(), "vmin": 0.0, "vmax": 360.0, "lw": 0}
+        look: style.Look = {"s": 3.0, "cmap": cyclic, "vmin": 0.0, "vmax": 360.0, "lw": 0}
         drawn = panel.scatter(np.arctan2(y, x)[contact], radius[contact], c=colour, **look)
         panel.set_title(joint)
         panel.set_rlabel_position(112.5)
@@ -178,13 +182,6 @@ def _circle(axes: "style.Axes", radius: float) -> None:
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
         look: style.Look = {"lw": 0.7, "label": "clearance circle", "color": style.colour("ink")}
         axes.plot(radius * np.cos(angle), radius * np.sin(angle), "--", **look)
-
-
-def _cyclic() -> Any:
-    """Colours for an angle: the ends meet, and none is as light as the page."""
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap(style.matplotlib().colormaps["twilight"](np.linspace(0.13, 0.87, 256)))
 
 
 def _equal(axes: "style.Axes", unit: labels.Scale, reach: float | None = None) -> None:

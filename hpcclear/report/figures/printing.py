@@ -40,11 +40,6 @@ class Printing:
     used: set[str] = field(default_factory=set)
     """Those that a text of the user stands for."""
 
-    @property
-    def is_particular(self) -> bool:
-        """Whether anything is not as usual, so that labels may not fit."""
-        return bool(self.rc or self.height or self.texts)
-
 
 _USUAL = Printing()
 wanted: ContextVar[Printing] = ContextVar("what a user wants of figures", default=_USUAL)

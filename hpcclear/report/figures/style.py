@@ -361,7 +361,8 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
         try:
             figure.set_dpi(dpi)
             if engine is not None:  # here, as matplotlib would draw all of it once more for it
-                if user.is_particular and hasattr(engine, "check"):
+                asked = user.rc or user.height or user.texts  # so that labels may not fit
+                if asked and hasattr(engine, "check"):
                     engine.check(figure)
                 else:
                     engine.execute(figure)
