@@ -210,7 +210,7 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
     files = {"verification": found, "worst": worst}
     text = next(line.text for line in answer(files) if line.label == "worst case")
     assert text.startswith("f reaches at least")
-    first = screen_of(Content(Path("x"), files, {}))
+    first = screen_of(Content(Path("x"), files))
     (fit,) = [row.cells[-1] for row in first.rows if row.label.startswith("fit")]
     assert fit.startswith(("40 H7/", "40 H6/"))
 

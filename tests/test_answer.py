@@ -103,7 +103,7 @@ def test_total_indices_are_printed_and_small_ones_without_a_number(total, error,
 
 def opened(content, **more):
     """The first screen of designs."""
-    return screen_of(Content(Path("out"), {"verification": content, **more}, {}))
+    return screen_of(Content(Path("out"), {"verification": content, **more}))
 
 
 def test_the_first_screen_has_the_design_beside_todays_with_changes_and_intervals():
@@ -144,7 +144,7 @@ def test_a_change_within_its_interval_is_none(half):
 def test_the_terminal_has_24_lines_of_80_columns(capsys):
     many = {name: np.linspace(0.1, 0.5, 5) for name in ("m1", "u1", "I1", "u2", "I2", "m3", "C")}
     content = verified(MEAN, DEVIATION, beyond_hertz=np.full(5, 90), **many)
-    describe(Content(Path("out"), {"verification": content, "sensitivity": data.sensitivity()}, {}))
+    describe(Content(Path("out"), {"verification": content, "sensitivity": data.sensitivity()}))
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= 80

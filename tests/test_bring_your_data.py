@@ -189,7 +189,7 @@ def test_a_result_carries_what_files_held(tmp_path):
     changed = scene.with_({"drive.speed": "900 rpm"})
     assert scene_of_text(changed.text, "result.nc") == changed
     result = data.response().assign_attrs(changed.origin)
-    (table,) = inputs(Content(tmp_path, {}, {}, {"response": result}))
+    (table,) = inputs(Content(tmp_path, {}, {"response": result}))
     drawn = {name: value for _, name, value in table.rows}["p.csv"]
     x, y = np.array([point.split(",") for point in drawn["points"].split()], float).T
     np.testing.assert_allclose(

@@ -123,7 +123,7 @@ def test_no_design_is_recommended_within_constraints_that_it_may_break(
 ):
     lines = answer({"verification": verified(verdict, price, excess)})
     text = {line.label: line.text for line in lines}
-    first = screen_of(Content(Path("out"), {"verification": verified(verdict, price, excess)}, {}))
+    first = screen_of(Content(Path("out"), {"verification": verified(verdict, price, excess)}))
     assert first.headline.startswith("No simulated design")
     assert first.header[-1] == "nearest"
     assert text["criterion"].startswith(f"{nearest}: ")

@@ -43,13 +43,11 @@ class CalledEquations:
         self.start = np.concatenate([start.state(n), np.zeros(self.size)])
         self.contacts = start.contacts.copy()
         self.origin = start
-        self.calls = 0
         self._head = problem.motion(problem.effects, 1).address, problem.tables
         self._seen = new_seen(n, par, self.size)
 
     def __call__(self, time: float, y: Array) -> Array:
         """dy/dt, shape (2 n + joints,)."""
-        self.calls += 1
         derivative(*self._head, self.contacts, time, y, *self._seen)
         return self._seen.rates.copy()
 

@@ -77,13 +77,12 @@ def describe_run(
     own = {kind: found.content}
     with contextlib.suppress(InputError):  # it may be written over by another command
         own["timing"] = dataset.read(found.timing, "timing")
-    content = Content(found.output.parent, own, {})
-    describe(content, found.output, asked=asked, details=details)
+    describe(Content(found.output.parent, own), found.output, asked=asked, details=details)
 
 
 def describe_response(response: Results, output: Path, details: bool | None = None) -> None:
     """Print one response (kind ``response``) and its file."""
-    describe(Content(output.parent, {}, {}, {"response": response}), output, details=details)
+    describe(Content(output.parent, {}, {"response": response}), output, details=details)
 
 
 def fitted(first: Screen, most: int) -> list[Text]:

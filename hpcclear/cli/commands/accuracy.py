@@ -73,7 +73,7 @@ def _measure(
         profile = PROFILES["quick" if quick else "full"]
         place = cli.place_of(output)
         found, drawn = run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh))
-        describe(Content(place, {"accuracy": found}, {}), *list(drawn.values())[:1])
+        describe(Content(place, {"accuracy": found}), *list(drawn.values())[:1])
 
 
 def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:

@@ -31,7 +31,6 @@ class Assembly:
     loops: Loops  # its coordinates are those of `q` and `v`
     q: Array  # mass centres and angles of the bodies at the start, SI, (n,), and their velocities
     v: Array
-    steps: int  # Newton steps it took
 
     def angle(self, body: str) -> float:
         """Angle of a body at the start, rad."""
@@ -60,14 +59,14 @@ def assemble(mechanism: Mechanism) -> Assembly:
     """
     bare = uncentred(mechanism)
     loops = Loops(bare, closed=True)
-    q, steps = _closed(loops, rough_pose(loops)[:, None], _eccentricities(loops)[:, None])
+    q = _closed(loops, rough_pose(loops)[:, None], _eccentricities(loops)[:, None])
     jacobian = loops.at(q, np.zeros_like(q), np.zeros(1)).jacobian[0]
     check_rank(loops, jacobian, ideal_rows(mechanism, loops), 0.0)
-    made = Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
+    made = Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0])
     if bare.bodies == mechanism.bodies:
         return made
     about = Loops(mechanism, closed=True)
-    return Assembly(about, *coordinates(about.forest, made, mechanism), steps)
+    return Assembly(about, *coordinates(about.forest, made, mechanism))
 
 
 def placed(
@@ -156,13 +155,13 @@ def assemble_samples(
     rough = np.broadcast_to(rough_pose(loops).T, (count, loops.size)).T.copy()
     wanted = np.broadcast_to(_eccentricities(loops).T, (count, len(loops.owners))).T
     with np.errstate(invalid="ignore"):
-        q, steps, left, _ = _newton(loops, rough, wanted)
+        q, left, _ = _newton(loops, rough, wanted)
         good = left <= NEARLY * lengths
         q[:, ~good] = rough[:, ~good]
         jacobian = loops.at(q, np.zeros_like(q), np.zeros(count)).jacobian
         rows = (jacobian * _scales(loops)[:, None])[:, ideal_rows(structure, loops)]
         good &= smallest_value(rows, loops.size) > SINGULAR
-        return Assembly(loops, q, _velocities(loops, q), steps), good
+        return Assembly(loops, q, _velocities(loops, q)), good
 
 
 def _scales(loops: Loops) -> Array:
@@ -200,7 +199,7 @@ def _eccentricities(loops: Loops) -> Array:
     return np.array(np.broadcast_arrays(*wanted), float)
 
 
-def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
+def _closed(loops: Loops, rough: Array, wanted: Array) -> Array:
     """From rough angles; where these lead into a corner, from angles near them, further and further off."""
     rng = np.random.default_rng(0)  # the same tries for the same mechanism
     guided = {split(joint.point)[0] for joint in loops.mechanism.joints if joint.kind == "slide"}
@@ -208,13 +207,11 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
         [one.kind == "angle" and one.body not in guided for one in loops.forest.coordinates], float
     )
     nearest: tuple[float, int] = (math.inf, 0)
-    taken = 0
     for reach in (0.0, *np.linspace(0.2, 1.5, MOST_TRIES)):
         turned = reach * angles * rng.normal(size=loops.size)
-        q, steps, left, worst = _newton(loops, rough + turned[:, None], wanted)
-        taken += steps
+        q, left, worst = _newton(loops, rough + turned[:, None], wanted)
         if left[0] <= NEARLY * loops.scales.max():
-            return q, taken
+            return q
         nearest = min(nearest, (float(left[0]), int(worst[0])))
     raise InputError(
         loops.owners[nearest[1]], nearest[0],
@@ -223,9 +220,9 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
     )  # fmt: skip
 
 
-def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, Integers]:
-    """Newton's method by least changes, shortened until the error falls, of poses (n, m): poses, steps, errors left (m,), and
-    their rows."""
+def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, Array, Integers]:
+    """Newton's method by least changes, shortened until the error falls, of poses (n, m): poses, errors left (m,), and their
+    rows."""
     zero, times = np.zeros_like(q), np.zeros(q.shape[1])
     scales = _scales(loops).T
     length = scales.max(axis=0)
@@ -237,8 +234,7 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, I
 
     error, left, jacobian = found(q)
     going = np.isfinite(left)
-    steps = 0
-    while steps < MOST_STEPS:
+    for _ in range(MOST_STEPS):
         going &= left > CLOSED * length
         if not going.any():
             break
@@ -258,9 +254,8 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, I
             break
         q = np.where(going, new, q)
         error, left, jacobian = found(q)
-        steps += 1
     rows: Integers = np.abs(error).argmax(axis=0)
-    return q, steps, np.abs(error).max(axis=0, initial=0.0), rows
+    return q, np.abs(error).max(axis=0, initial=0.0), rows
 
 
 def rough_pose(loops: Loops) -> Array:
@@ -294,15 +289,12 @@ def rough_pose(loops: Loops) -> Array:
     return np.array(np.broadcast_arrays(*found), float)
 
 
-def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> float:
-    """Smallest singular value of the constraints' Jacobian (rows, n), rows scaled to 1, of those that `rows` picks.
-
-    Raises InputError if they depend on one another.
-    """
+def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> None:
+    """Raise InputError if constraints depend on one another, of those with Jacobian (rows, n) that `rows` picks."""
     scaled = (jacobian * loops.scales)[rows]
     smallest = float(smallest_value(scaled, loops.size))
     if smallest > SINGULAR:
-        return smallest
+        return
     share = np.abs(np.linalg.svd(scaled / _sizes(scaled))[0][:, -1])
     owners = [owner for owner, taken in zip(loops.owners, rows, strict=True) if taken]
     named = [owner for owner, part in zip(owners, share, strict=True) if part > 0.1 * share.max()]
@@ -314,13 +306,12 @@ def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> fl
     )  # fmt: skip
 
 
-def check_ranks(loops: Loops, q: Array, v: Array, times: Array) -> Array:
-    """Smallest singular values (t,) of all constraints, as of `check_rank`, along a motion (n, t); errors as there."""
+def check_ranks(loops: Loops, q: Array, v: Array, times: Array) -> None:
+    """`check_rank` of all constraints along a motion (n, t)."""
     jacobians = loops.at(q, v, times).jacobian
-    found: Array = smallest_value(jacobians * loops.scales, loops.size)
-    for k in np.flatnonzero(found <= SINGULAR)[:1]:
+    smallest = smallest_value(jacobians * loops.scales, loops.size)
+    for k in np.flatnonzero(smallest <= SINGULAR)[:1]:
         check_rank(loops, jacobians[k], np.ones(len(loops.owners), bool), float(times[k]))
-    return found
 
 
 def _sizes(rows: Array) -> Array:

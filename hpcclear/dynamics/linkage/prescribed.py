@@ -50,11 +50,10 @@ class Prescribed:
     power: Array  # of all drives, of friction, of the loads, W, (t,)
     loss: Array
     load_power: Array
-    margin: Array  # smallest singular value of the constraints, rows scaled to 1, (t,): 0 at a dead centre
 
     def at(self, times: Array, values_of: Callable[[Array], Array]) -> "Prescribed":
         """The same at other instants: what makes values there of these, the instants first."""
-        parts = ("q", "v", "a", "power", "loss", "load_power", "margin")
+        parts = ("q", "v", "a", "power", "loss", "load_power")
         holds = {name: values_of(values) for name, values in self.holds.items()}
         known: dict[str, Any] = {name: values_of(getattr(self, name)) for name in parts}
         return replace(self, times=times, holds=holds, **known)
@@ -108,7 +107,7 @@ def _diverges(assembly: Assembly, passage: Passage, change: WalkPose, gravity: f
     sides = change.time + np.concatenate([-near, near])
     times = np.concatenate([sides, change.time - far])
     rows = cartesian(assembly, passage, *passage.at(times), times)
-    held = _reactions(assembly, times, rows, gravity, np.zeros(len(times)), {}).holds
+    held = _reactions(assembly, times, rows, gravity, {}).holds
     sizes = [assembly.loops.length if name.endswith("_angle") else 1.0 for name in held]
     force = np.array(list(held.values())) / np.array(sizes)[:, None]
     wide, close = 0.5 * (force[:, 2:4] - force[:, :2]).T
@@ -223,12 +222,12 @@ def _motion(
     shown, filled = _beside(passage, times)
     rows = cartesian(assembly, passage, *passage.at(shown), shown)
     q, v = np.moveaxis(rows, 0, -1)
-    margin = check_ranks(assembly.loops, q, v, shown)
-    return _reactions(assembly, shown, rows, gravity, margin, curves).at(times, filled)
+    check_ranks(assembly.loops, q, v, shown)
+    return _reactions(assembly, shown, rows, gravity, curves).at(times, filled)
 
 
 def _reactions(
-    assembly: Assembly, times: Array, found: Array, gravity: float, margin: Array, tabulated: Curves
+    assembly: Assembly, times: Array, found: Array, gravity: float, tabulated: Curves
 ) -> Prescribed:
     """Accelerations and reactions from the equations of motion, instants batched as rows of arrays."""
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
@@ -252,5 +251,4 @@ def _reactions(
     return Prescribed(
         assembly, times, found[:, 0], found[:, 1], work[2 * n : 3 * n].T.copy(), from_row,
         work[rates + at.DRIVE_POWER], work[rates + at.DISSIPATION], work[rates + at.LOAD_POWER],
-        margin,
     )  # fmt: skip

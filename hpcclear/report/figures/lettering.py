@@ -95,9 +95,9 @@ class Lettering:
             lead = self.corners[0] + np.array([anchor, edge]) / self.per_m
             self.line(lead, colour, 0.4, zorder=3)
 
-    def dimension(self, ends: ArrayLike, text: str, along: Array, levels: Array) -> bool:
-        """Draw a dimension line along a direction (2,) between two places (2, 2), at one of the levels across it (m); return
-        whether one has room."""
+    def dimension(self, ends: ArrayLike, text: str, along: Array, levels: Array) -> None:
+        """Draw a dimension line along a direction (2,) between two places (2, 2), at one of the levels across it (m) that has
+        room, if any has."""
         written, size = self._written(text, "ink")
         across, best, least = np.array([-along[1], along[0]]), None, np.inf
         places = np.asarray(ends, float)
@@ -118,7 +118,7 @@ class Lettering:
                 best, least = (feet, middles[int(cost.argmin())], room), float(cost.min())
         if best is None or least >= 200.0:
             written.remove()
-            return False
+            return
         feet, middle, room = best
         for place, foot in zip(places, feet, strict=True):
             beyond = 2.0 * (foot - place) / (float(np.hypot(*(foot - place))) or 1.0)
@@ -128,7 +128,6 @@ class Lettering:
             for foot, way in ((feet[0], along), (feet[1], -along)):
                 self.arrow(foot - 7.0 * way / self.per_m, foot, "ink", "->", 0.5)
         self._put(written, middle, size)
-        return True
 
     def _written(self, text: str, colour: str) -> tuple[Any, Array]:
         """A word at no place yet, and its size (2,) in points."""

@@ -22,8 +22,6 @@ class Content:
     directory: Path
     files: dict[str, Results]
     """By kind; responses are apart."""
-    names: dict[str, str]
-    """The file each came from, by kind."""
     responses: dict[str, Results] = field(default_factory=dict)
     """By the name of the design."""
     troubles: tuple[str, ...] = ()
@@ -109,7 +107,7 @@ def read(*places: str | Path) -> Content:
         text = "The files in this directory were made from different scenes: do not compare them."
         troubles = [*troubles, text]
     every = tuple(troubles)
-    return Content(place, files, names, responses, every, whole, samples, float(dated))
+    return Content(place, files, responses, every, whole, samples, float(dated))
 
 
 def scene_in(text: str) -> Scene | None:

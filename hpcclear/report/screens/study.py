@@ -149,7 +149,7 @@ def _limits(best: Results) -> Iterator[Tile]:
 
 def simulated(one: Results) -> list[list[str]]:
     """Return what is known of a simulated design: values with their intervals, and how many simulations."""
-    tiles = _tiles(one, None, Content(Path(), {}, {}))
+    tiles = _tiles(one, None, Content(Path(), {}))
     rows = [[tile.label, f"{tile.value} {tile.within}".rstrip()] for tile in tiles]
     return rows + [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
 
