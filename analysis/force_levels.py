@@ -13,7 +13,7 @@ from recorded import record
 from scipy import signal
 
 from hpcclear import load_scene, simulate
-from hpcclear.report.noise import band_name
+from hpcclear.report.figures.noise import band_name
 from hpcclear.statistics import spectra
 
 ROOT = Path(__file__).parent.parent

@@ -84,7 +84,7 @@ def outline(curve: Tabulated) -> str:
     return " ".join(f"{100 * x:.1f},{24 - 24 * y:.1f}" for x, y in shares.T)
 
 
-@style.figure("response", "tables", "tables of the scene, as they are simulated", 100)
+@style.figure("tables of the scene, as they are simulated", 100)
 def tables_figure(response: Results) -> "style.Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
     tables = tabulated(scene_of_text(str(response.attrs["scene"]), "scene"))

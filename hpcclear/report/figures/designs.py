@@ -12,10 +12,7 @@ from hpcclear.report.figures import labels, motion, style
 from hpcclear.results.content import Results, each, text_in, texts_in
 
 
-@style.figure(
-    "front", "front",
-    "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs.", beside="verification",
-)  # fmt: skip
+@style.figure("Pareto fronts of all runs as predicted by the surrogate, and the simulated designs.")
 def front_figure(front: Results, verification: Results | None = None) -> "style.Figure":
     """Pareto fronts of all cases (kind ``front``), and the designs that were simulated (the paper's Fig. 9; kind
     ``verification``), with confidence intervals, joined to what the surrogate said.

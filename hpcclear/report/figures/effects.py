@@ -1,7 +1,7 @@
 """Which effects a scene can do without (kind ``effects``): a bar each, cost beside change, and the sentences that say it."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from hpcclear.base.student import student
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND
 
@@ -122,11 +121,10 @@ def statements(content: Results, seconds: Times) -> list[str]:
     return [*filter(None, doubts), *distinguished(content), last]
 
 
-def distinguished(content: Results) -> list[str]:
+def distinguished(content: Results) -> Iterator[str]:
     """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
     off = content["off"].values
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
-    found = []
     for k, row in enumerate(off):
         parts = np.flatnonzero(row).tolist()
         if len(parts) != 2 or any(p not in single for p in parts):
@@ -136,14 +134,26 @@ def distinguished(content: Results) -> list[str]:
         limit = np.sqrt((content["limit"].values[rows, 0] ** 2).sum())
         more = change[0] - change[1:].sum()
         if abs(more) > limit:
-            found.append(
-                f"{label(named(content, k))} interact: together they change f by {100 * change[0]:+.2g} %, "
-                f"not {100 * change[1:].sum():+.2g} %."
-            )
-    return found
+            whole, parts_sum = (f"{100 * one:+.2g} %" for one in (change[0], change[1:].sum()))
+            yield f"{label(named(content, k))} interact: together they change f by {whole}, not {parts_sum}."
 
 
-@style.drawn
+def caption(effects: Results, timing: Results | None) -> str:
+    """What `effects_figure` shows."""
+    seconds, cost = seconds_of(timing), "estimated from evaluations of the equations of motion"
+    variants = range(1, effects.sizes["variant"])
+    if rounds := max((saving(effects, k, seconds).rounds for k in variants), default=0):
+        cost = f"mean of {rounds} paired measurements"
+        cost += " with its 95 % confidence interval" if rounds > 1 else ""
+    return (
+        "Size of the change of the mean of f with each effect off, with its "
+        f"{100 * float(effects.attrs['confidence']):g} % confidence interval; dashed: the tolerance. Green: within it in all "
+        "judged results, red: needed, grey: undecided. “Left out”: the effects that can be neglected together. Right: run "
+        f"time saved, {cost}."
+    )
+
+
+@style.figure(caption)
 def effects_figure(effects: Results, timing: Results | None = None) -> "style.Figure":
     """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
 
@@ -181,25 +191,7 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
     return figure
 
 
-def caption(effects: Results, timing: Results | None) -> str:
-    """What `effects_figure` shows."""
-    seconds, cost = seconds_of(timing), "estimated from evaluations of the equations of motion"
-    variants = range(1, effects.sizes["variant"])
-    if rounds := max((saving(effects, k, seconds).rounds for k in variants), default=0):
-        cost = f"mean of {rounds} paired measurements"
-        cost += " with its 95 % confidence interval" if rounds > 1 else ""
-    return (
-        "Size of the change of the mean of f with each effect off, with its "
-        f"{100 * float(effects.attrs['confidence']):g} % confidence interval; dashed: the tolerance. Green: within it in all "
-        "judged results, red: needed, grey: undecided. “Left out”: the effects that can be neglected together. Right: run "
-        f"time saved, {cost}."
-    )
-
-
 def _wrapped(names: list[str], recommended: bool) -> str:
     """A label of few words a line, marked if it is what is recommended."""
     lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
     return "\n".join(lines) + (" (left out)" if recommended else "")
-
-
-PARTS = (FigureOf("effects", "effects", effects_figure, caption, beside="timing"),)

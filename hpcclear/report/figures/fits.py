@@ -47,11 +47,11 @@ def warnings(kind: str, content: Results | None) -> list[str]:
     ]
 
 
-def captioned(kind: str, caption: str) -> Callable[[Results], str]:
+def captioned(caption: str) -> Callable[[Results], str]:
     """Return what makes the caption of a figure of surrogates: behind its words, those that do not fit."""
 
     def of(content: Results) -> str:
-        found = warnings(kind, content)
+        found = warnings(str(content.attrs["hpcclear_kind"]), content)
         return f"{caption} Warning: {'; '.join(found)}." if found else caption
 
     return of

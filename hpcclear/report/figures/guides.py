@@ -29,14 +29,14 @@ def touches(response: Results) -> list[Touch]:
     """
     time, turn = response["time"].values, motion.turns(response)
     depth = response["penetration"].values > 0.0
-    found = []
-    for column, label in zip(depth.T, response["joint"].values, strict=True):
-        for k in np.flatnonzero(column[1:] & ~column[:-1]) + 1:
-            found.append(Touch(float(time[k]), float(turn[k]), str(label)))
-    return sorted(found)
+    return sorted(
+        Touch(float(time[k]), float(turn[k]), str(label))
+        for column, label in zip(depth.T, response["joint"].values, strict=True)
+        for k in np.flatnonzero(column[1:] & ~column[:-1]) + 1
+    )
 
 
-@style.figure("response", "guide", "offset, tilt and contacts in guides", 40, along="guide")
+@style.figure("offset, tilt and contacts in guides", 40, along="guide")
 def guide_figure(response: Results) -> "style.Figure":
     """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last two revolutions of a
     response (kind ``response``). Raises InputError where no guide has clearance."""

@@ -22,10 +22,7 @@ def _entry(identify: Results, unknown: int, scale: labels.Scale) -> str:
     return scale.label(labels.entry(texts_in(identify, "unknown")[unknown]))
 
 
-@style.figure(
-    "identify", "posterior",
-    "Posterior of each unknown with its calibrated 95 % interval.",
-)  # fmt: skip
+@style.figure("Posterior of each unknown with its calibrated 95 % interval.")
 def posterior_figure(identify: Results) -> "style.Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``. Raises
     InputError where no signal was measured."""
@@ -50,8 +47,7 @@ def posterior_figure(identify: Results) -> "style.Figure":
 
 
 @style.figure(
-    "identify", "features",
-    "Measured less predicted features of the last record, in standard deviations of the prediction.", 1,
+    "Measured less predicted features of the last record, in standard deviations of the prediction.", 1
 )  # fmt: skip
 def features_figure(identify: Results) -> "style.Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
@@ -73,10 +69,7 @@ def features_figure(identify: Results) -> "style.Figure":
     return figure
 
 
-@style.figure(
-    "identify", "growth",
-    "Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2,
-)  # fmt: skip
+@style.figure("Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2)
 def growth_figure(identify: Results) -> "style.Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
     Raises InputError where there is one record only, or none has a date."""

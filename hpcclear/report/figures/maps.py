@@ -19,9 +19,9 @@ _EXPONENT = "largest Lyapunov exponent (1/revolution)"
 
 
 @style.figure(
-    "map", "map",
     "Largest Lyapunov exponent, period and regime of each cell of the map; along a line also f with its 95 % CI.",
-)  # fmt: skip
+    kind="map",
+)
 def map_figure(samples: Results) -> "style.Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval. Raises InputError
     where the dataset is no map."""
@@ -105,9 +105,8 @@ def _line(cells: Results, name: str) -> "style.Figure":
 
 
 @style.figure(
-    "bifurcation", "bifurcation",
-    "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions.",
-)  # fmt: skip
+    "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions."
+)
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
     """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``). A motion that repeats
     every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError where the dataset is no

@@ -73,7 +73,7 @@ FALL = 80.0
 """Levels that are further below the highest are not shown, dB."""
 
 
-@style.figure("response", "noise", "force levels and orders", 80, along="band")
+@style.figure("force levels and orders", 80, along="band")
 def noise_figure(response: Results) -> "style.Figure":
     """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
     squares of their orders. Raises InputError where the response has no levels."""

@@ -10,7 +10,7 @@ from hpcclear.report.figures import labels, motion, style
 from hpcclear.results.content import Results
 
 
-@style.figure("response", "orbit", "journal-centre orbits in the clearance circle", 10)
+@style.figure("journal-centre orbits in the clearance circle", 10)
 def orbit_figure(response: Results) -> "style.Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight, over the later half of the
     revolutions of a response (kind ``response``)."""
@@ -39,7 +39,7 @@ def orbit_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.figure("response", "force-direction", "contact force by its direction", 20)
+@style.figure("contact force by its direction", 20, name="force-direction")
 def force_polar_figure(response: Results) -> "style.Figure":
     """Contact force over its direction in the fixed frame, over the same revolutions as `orbit_figure`."""
     from matplotlib.colors import ListedColormap
@@ -68,7 +68,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.figure("response", "phase", "phase portraits", 50)
+@style.figure("phase portraits", 50)
 def phase_figure(response: Results) -> "style.Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
@@ -200,7 +200,7 @@ CROSSINGS = 200
 """Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
 
 
-@style.figure("response", "poincare", "Poincaré section, once a revolution", 60)
+@style.figure("Poincaré section, once a revolution", 60, name="poincare")
 def section_figure(response: Results) -> "style.Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
     count = motion.whole_turns(response) - int(response.attrs.get("transient_turns", 0))

@@ -34,7 +34,7 @@ def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure
     return figure
 
 
-@style.figure("response", "penetration", "penetration", 30)
+@style.figure("penetration", 30)
 def penetration_figure(response: Results) -> "style.Figure":
     """Penetration of the joints over the last two revolutions of a response (kind ``response``)."""
     shown = motion.latest(response)
@@ -53,7 +53,7 @@ def penetration_figure(response: Results) -> "style.Figure":
     return figure
 
 
-@style.figure("response", "energy", "energy balance", 90)
+@style.figure("energy balance", 90)
 def energy_figure(response: Results) -> "style.Figure":
     """Energy balance of a response (kind ``response``): work of drive and loads and dissipated energy since the start, stored
     energy, and the residual."""

@@ -11,9 +11,8 @@ from hpcclear.results.content import Results, Variable
 
 
 @style.figure(
-    "samples", "samples",
-    "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
-)  # fmt: skip
+    "Objective against each design variable, its cycle-to-cycle standard deviation and histogram."
+)
 def samples_figure(samples: Results) -> "style.Figure":
     """Objective of samples (kind ``samples``) against every design variable, coloured by clearance; its spread, histogram and
     failures. Raises InputError where there is no design variable to draw against."""

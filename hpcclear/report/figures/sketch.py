@@ -78,7 +78,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
 _PICTURE = 95.0  # mm of width of a drawing alone
 
 
-@style.figure("response", "mechanism", "the mechanism to scale, with its dimensions", 5)
+@style.figure("the mechanism to scale, with its dimensions", 5)
 def mechanism_figure(response: Results, before: Results | None = None) -> "style.Figure":
     """The mechanism of a response (kind ``response``) to scale, with dimensions; beside that of another design, parts that
     differ are coloured and its outline is dashed. Raises InputError where the file does not hold its scene whole."""

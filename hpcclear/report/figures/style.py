@@ -157,13 +157,18 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
 
 
 def figure(
-    kind: str, name: str, caption: str | Callable[..., str], order: int = 0, beside: str = "", along: str = ""
+    caption: str | Callable[..., str], order: int = 0, *, name: str = "", kind: str = "", along: str = ""
 ) -> "Callable[[Callable[..., Figure]], Callable[..., Figure]]":  # fmt: skip
-    """Draw a figure as `drawn` does, and declare it as one of results (`hpcclear.report.parts.FigureOf`)."""
+    """Draw a figure as `drawn` does, and declare it as one of results (`hpcclear.report.parts.FigureOf`).
+
+    Its name is that of its function, and its files are of the kinds that its arguments are called as, unless others are given.
+    """
 
     def declared(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
-        made = drawn(function)
-        made.declared = FigureOf(kind, name, made, caption, order, beside, along)  # type: ignore[attr-defined]
+        made, (first, *others) = drawn(function), inspect.signature(function).parameters
+        own = kind or first, name or function.__name__.removesuffix("_figure")
+        beside = next((one for one in others if one in KINDS), "")
+        made.declared = FigureOf(*own, made, caption, order, beside, along)  # type: ignore[attr-defined]
         return made
 
     return declared

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 @style.figure(
-    "sensitivity", "sensitivities",
     "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
     "from the ranges at which they converged.",
-)  # fmt: skip
+    name="sensitivities",
+)
 def sensitivity_figure(sensitivity: Results) -> "style.Figure":
     """Sensitivities (kind ``sensitivity``) against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
@@ -66,9 +66,8 @@ def _sensitivity_panel(
 
 
 @style.figure(
-    "sensitivity", "surface-fit", order=2, caption=fits.captioned(
-        "sensitivity", "Fit of the response surfaces on test points, against clearance and length of the ranges."
-    ),
+    fits.captioned("Fit of the response surfaces on test points, against clearance and length of the ranges."), 2,
+    name="surface-fit",
 )  # fmt: skip
 def fit_figure(sensitivity: Results) -> "style.Figure":
     """Fit of the response surfaces (kind ``sensitivity``) against clearance, a curve for each interval (the paper's Fig. 7)."""
@@ -102,9 +101,8 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
 
 
 @style.figure(
-    "sensitivity", "sobol",
     "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
-    "indices (with interactions; their sum may exceed 1).", 1,
+    "indices (with interactions; their sum may exceed 1).", 1
 )  # fmt: skip
 def sobol_figure(sensitivity: Results) -> "style.Figure":
     """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors. Raises
@@ -136,9 +134,8 @@ LEVELS = 24
 
 
 @style.figure(
-    "kriging", "surrogates", fits.captioned(
-        "kriging", "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance."
-    ),
+    fits.captioned("Objective by Kriging over pairs of design variables, at the smallest and the largest clearance."),
+    name="surrogates",
 )  # fmt: skip
 def surfaces_figure(kriging: Results) -> "style.Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces), of the
@@ -192,9 +189,8 @@ def _fields(model: "Piecewise", main: int) -> tuple[Array, Array, Array, Array]:
 
 
 @style.figure(
-    "kriging", "parity",
-    fits.captioned("kriging", "Surrogate against simulation: leave-one-out predictions; R² on test points."), 1,
-)  # fmt: skip
+    fits.captioned("Surrogate against simulation: leave-one-out predictions; R² on test points."), 1
+)
 def parity_figure(kriging: Results) -> "style.Figure":
     """Surrogate against dynamics, every model of a file of kind ``kriging`` (the paper's Figs. 6 and 8).
 

@@ -6,7 +6,7 @@ from hpcclear.report.figures import labels, style
 from hpcclear.results.content import Results
 
 
-@style.figure("timing", "timing", "Time of the ranks, by rank and by stage.")
+@style.figure("Time of the ranks, by rank and by stage.")
 def timing_figure(timing: Results) -> "style.Figure":
     """How every rank spent its time, and how much of it each stage took (kind ``timing``)."""
     shown = min(timing.sizes["rank"], 64), timing.sizes["stage"]

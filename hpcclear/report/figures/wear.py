@@ -8,9 +8,9 @@ from hpcclear.results.content import Results, texts_in
 
 
 @style.figure(
-    "wear", "wear",
     "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
-)  # fmt: skip
+    name="wear",
+)
 def fan_figure(wear: Results) -> "style.Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
     (kind ``wear``)."""
@@ -38,10 +38,7 @@ def fan_figure(wear: Results) -> "style.Figure":
     return figure
 
 
-@style.figure(
-    "wear", "survival",
-    "Survival, with 95 % confidence interval (Clopper and Pearson).", 1,
-)  # fmt: skip
+@style.figure("Survival, with 95 % confidence interval (Clopper and Pearson).", 1)
 def survival_figure(wear: Results) -> "style.Figure":
     """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``). Raises InputError
     where no limit was given that could end a life."""
@@ -73,8 +70,8 @@ AGES = 4
 
 
 @style.figure(
-    "wear", "wear-profile",
     "Depth of wear around bearings and journals, at several ages (medians over all runs).", 2,
+    name="wear-profile",
 )  # fmt: skip
 def profile_figure(wear: Results) -> "style.Figure":
     """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``). Raises
