@@ -5,7 +5,7 @@ amplify any error to the same size (the averaging panel shows that bound).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,13 +21,12 @@ LOST = 10.0
 """Error of the position, in lengths of the crank, above which a method has lost the motion: its errors are not reported."""
 
 
-@dataclass(frozen=True)
-class Reference:
-    """Values (designs, 4) as in `QUANTITIES`, what errors are divided by, and the reference's own relative error."""
+class Reference(NamedTuple):
+    """Values (designs, 4) as in `QUANTITIES`, what errors are divided by, and the reference's own relative error (4,)."""
 
     values: Array
-    scale: Array  # (designs, 4)
-    error: Array  # (4,)
+    scale: Array
+    error: Array
 
 
 def reference_of(scene: Scene, designs: int) -> Reference:

@@ -1,6 +1,6 @@
 """How large the time series of a response are, before it is simulated."""
 
-from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.problem import linkage_of, rounds_of
 from hpcclear.dynamics.planar.response import pins_of
 from hpcclear.scene import Scene
 
@@ -12,7 +12,7 @@ LARGE = 5e7  # bytes of a file from which on its size is printed before a simula
 
 def kept_revolutions(scene: Scene) -> int:
     """How many revolutions have time series."""
-    count = scene.numerics.transient_revolutions + scene.numerics.averaged_revolutions
+    count = rounds_of(scene)
     return min(count, scene.output.keep_revolutions or count)
 
 

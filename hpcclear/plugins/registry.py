@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.plugins.sources import REFERENCE, digest, note_package, run_source, texts_in_use
@@ -11,13 +11,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
 
-class _Offered(NamedTuple):
-    """What an installed package offers."""
-
-    value: object
-    package: str
-    version: str
-
+_Offered = tuple[object, str, str]
+"""What an installed package offers; its name and version."""
 
 Plugin = TypeVar("Plugin")
 
@@ -84,7 +79,7 @@ class Registry(Generic[Plugin]):
         if self.is_ours(name):
             return ""
         if name in self._offered:
-            return f"{self._offered[name].package} {self._offered[name].version}"
+            return "{1} {2}".format(*self._offered[name])
         module = name.partition(":")[0]
         text = (texts_in_use() if texts is None else texts)[module]
         return f"{module}.py, SHA-256 {digest(text)[:12]}"
@@ -112,9 +107,9 @@ class Registry(Generic[Plugin]):
                 reason = f"is offered by {packages}"
                 raise InputError(self.kind, name, reason, "Uninstall all but one of them")
             self._offered[name] = self._loaded(points[0])
-        found = self._offered[name]
-        note_package(found.package, found.version)
-        return found.value
+        value, *package = self._offered[name]
+        note_package(*package)
+        return value
 
     def _points(self, name: str | None = None) -> "EntryPoints":
         """What installed packages offer of this kind; looking for it takes a tenth of the time of `check`."""
@@ -126,7 +121,7 @@ class Registry(Generic[Plugin]):
     def _loaded(self, point: "EntryPoint") -> _Offered:
         package, version = _package(point)
         try:
-            return _Offered(point.load(), package, version)
+            return point.load(), package, version
         except (Exception, SystemExit) as error:
             raise InputError(
                 self.kind, point.name,

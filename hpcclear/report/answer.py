@@ -44,7 +44,7 @@ def _head(of: Recommended) -> Iterator[Line]:
     case = text_in(best, "case") or "of the study"
     count = ours.sizes["design"]
     name = text_in(best, "design")
-    text = f"{name}: {merit(ours, best)} of {count} simulated designs, case {case}"
+    text = f"{name}: {merit(best)} of {count} simulated designs, case {case}"
     yield Line("criterion", text)
     yield from (Line("constraint", text) for text in worded(best))
     if near := alike.flat(ours, best, judged(ours)):

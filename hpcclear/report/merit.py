@@ -87,7 +87,7 @@ def judged(ours: Results) -> np.ndarray:
     return np.where(level, merit, np.inf)
 
 
-def merit(ours: Results, best: Results) -> str:
+def merit(best: Results) -> str:
     """What `judged` goes by, in words."""
     if is_plain(best):
         return f"lowest mean + {SPAN:g} standard deviations of f"

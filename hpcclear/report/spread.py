@@ -3,7 +3,7 @@
 The `sample` command prints these lines, and the page shows them. No number is stated that the samples do not determine.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -142,21 +142,20 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
     return [*lines, Line("intervals", how)]
 
 
-def in_time(samples: Results) -> list[Line]:
-    """Return how well f is known in each sample: its half-width, and its standard deviation between revolutions."""
+def in_time(samples: Results) -> Iterator[Line]:
+    """Yield how well f is known in each sample: its half-width, and its standard deviation between revolutions."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
     f, remedy = np.abs(samples["objective"].values), "a response has one (hpcclear simulate)"
     if "objective" not in samples.attrs:
         remedy = "set numerics.target_error for one of each sample"
-    lines, columns = [], {"half-width of f": name, "cycle-to-cycle std. dev.": "objective_spread"}
+    columns = {"half-width of f": name, "cycle-to-cycle std. dev.": "objective_spread"}
     for label, column in columns.items():
         parts = samples[column].values / f if column in samples else np.array([])
         if np.isfinite(parts).any():
             text = f"median {100 * np.nanmedian(parts):.2f} %, largest {100 * np.nanmax(parts):.2f} % of f"
-            lines.append(Line(label, text))
+            yield Line(label, text)
         elif column == name:
-            lines.append(Line(label, f"{labels.NOT_CHECKED}; {remedy}"))
-    return lines
+            yield Line(label, f"{labels.NOT_CHECKED}; {remedy}")
 
 
 def shares(samples: Results, thresholds: Sequence[Beyond]) -> list[Line]:
@@ -205,13 +204,12 @@ def remarks(samples: Results) -> list[str]:
     return [f"{count} of {len(f)} samples: {text}" for count, text in found]
 
 
-def _length_of_peaks(samples: Results) -> list[Line]:
+def _length_of_peaks(samples: Results) -> Iterator[Line]:
     """Of how many revolutions each peak is the largest, since it grows with their number."""
     scene = scene_of(samples)
-    if scene is None or scene.numerics.target_error is not None:
-        return []
-    count = scene.numerics.averaged_revolutions
-    return [Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")]
+    if scene is not None and scene.numerics.target_error is None:
+        count = scene.numerics.averaged_revolutions
+        yield Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")
 
 
 def _values(samples: Results, name: str) -> Array:

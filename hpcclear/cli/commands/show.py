@@ -1,5 +1,6 @@
 """`show`: what a scene may name, the schema of scene files, how to cite."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -79,7 +80,7 @@ def _laws() -> None:
         offered = registries[kind].names() if kind in registries else ()
         for name, law in known_laws(kind).items():
             origin = registries[kind].origin(name) if name in offered else ""
-            console().print(table(name, list(_rows(law, origin))))
+            console().print(table(name, _rows(law, origin)))
     for place, others in _OTHERS.items():
         _list(place, getattr(plugins, others))
 
@@ -117,13 +118,12 @@ def _described(registry: Any, name: str) -> tuple[str, ...]:
     return (*(one.__doc__ or "").strip().splitlines()[:1], origin)
 
 
-def _rows(law: Any, origin: str) -> list[tuple[str, str]]:
+def _rows(law: Any, origin: str) -> Iterator[tuple[str, str]]:
     texts = {"what": law.words, "formula": law.formula, "valid": law.valid, "source": law.source}
     texts["package"] = origin
-    rows = [(label, text) for label, text in texts.items() if text]
+    yield from ((label, text) for label, text in texts.items() if text)
     for one in law.parameters:
         unit = f" in {one.unit}" if one.unit else ""
         default = "" if one.default is None else f", default {one.default:g}"
         bounds = one.bounds()
-        rows.append((one.name, f"{one.words}{unit}" + (f", {bounds}" if bounds else "") + default))
-    return rows
+        yield one.name, f"{one.words}{unit}" + (f", {bounds}" if bounds else "") + default

@@ -254,17 +254,15 @@ class Balance:
             for rates, held in self.coriolis(point.moves):
                 yield rates, (-ONE, own[column], held)
 
-    def coriolis(self, moves: Iterable[Move]) -> list[tuple[tuple[Term, ...], Held]]:
+    def coriolis(self, moves: Iterable[Move]) -> Iterator[tuple[tuple[Term, ...], Held]]:
         """Rates and vectors of 2 v w of what moves in turning frames, and of v^2 where its direction changes."""
-        found: list[tuple[tuple[Term, ...], Held]] = []
         for move in moves:
             if move.turns_along:
                 speed = named(self.kinematics.speed_name((move.kind, move.body, "")))
                 rates = (named("2.0"), speed, self.kinematics.spin(move.frame))
-                found.append((rates, (move.frame, move.direction.across())))
+                yield rates, (move.frame, move.direction.across())
                 if any(move.changing):
-                    found.append(((speed, speed), (move.frame, move.changing)))
-        return found
+                    yield (speed, speed), (move.frame, move.changing)
 
 
 def _times(term: Term, rates: tuple[Term, ...]) -> Term:

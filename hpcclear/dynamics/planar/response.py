@@ -3,7 +3,7 @@
 Of a followed point also how far clearance takes it off its path.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from types import MappingProxyType
@@ -110,9 +110,9 @@ def pins_of(mechanism: Mechanism) -> tuple[str, ...]:
     return tuple(joint.name for joint in mechanism.joints if isinstance(joint, PlanarRevolute))
 
 
-def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> list[str]:
+def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> Iterator[str]:
     """A sentence for each load that goes by an angle and was turned by more than a revolution."""
-    names, found = [body.name for body in mechanism.bodies], []
+    names = [body.name for body in mechanism.bodies]
     for load in mechanism.loads:
         if load.by_angle and "body_angle" in series:
             body, other = (getattr(load, entry, None) for entry in ("body", "other"))
@@ -121,11 +121,10 @@ def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> list[str]:
                 angle = angle - series["body_angle"][:, names.index(other)]
             turns = float(np.ptp(angle)) / at.TURN
             if turns > 1.0:
-                found.append(
+                yield (
                     f"the load {load.name} is wound up by {turns:.3g} turns: its torque goes by the whole angle of "
                     f"{body}. Couple bodies that go round together if it is not meant to"
                 )
-    return found
 
 
 def at_places(scene: Scene, columns: Array) -> Array:

@@ -13,6 +13,9 @@ Drawn = tuple[list[list[int]], Array, Array]
 """Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
 
 
+_OF_GUIDE = ("guide_offset", "guide_tilt")
+
+
 def bodies(shown: Results) -> Drawn:
     """Return the bodies of a response (kind ``response``) at each instant."""
     return _slider_crank(shown, eccentricities(shown)) if "rod_x" in shown else _linkage(shown)
@@ -43,10 +46,7 @@ def poses(scene: Scene, shown: Results, k: int) -> dict[str, Pose]:
         entries = ("body_x", "body_y", "body_angle")
         return {text_in(b, "body"): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
     phi, crank = float(one["crank_angle"]), scene.linkage.bodies[0].own_center[0]
-    aside, tilt = (
-        float(one[name].values[0]) if name in shown else 0.0
-        for name in ("guide_offset", "guide_tilt")
-    )
+    aside, tilt = (float(one[n].values[0]) if n in shown else 0.0 for n in _OF_GUIDE)
     height = aside + float(getattr(scene.mechanism, "offset", None) or 0.0)
     return {
         "crank": (crank * np.cos(phi), crank * np.sin(phi), phi),
@@ -76,10 +76,7 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     far = rod + far_pin
     slides = shown["slider_position"].values
     length = float((slides - far[:, 0]) @ along[:, 0] / (along[:, 0] @ along[:, 0]))
-    aside, tilt = (
-        shown[name].values[:, 0] if name in shown else np.zeros_like(phi)
-        for name in ("guide_offset", "guide_tilt")
-    )
+    aside, tilt = (shown[n].values[:, 0] if n in shown else np.zeros_like(phi) for n in _OF_GUIDE)
     height = float(np.mean(far[:, 1] + length * along[:, 1] - aside))
     slider = np.column_stack([slides, height + aside])
     points = np.stack([np.zeros_like(pin), pin, pin - near_pin, slider - far_pin, slider], axis=1)

@@ -33,10 +33,6 @@ class Content:
     dated: float = np.nan
     """Time at which the newest of these files was written, s since 1970."""
 
-    def get(self, kind: str) -> Results | None:
-        """The dataset of a kind, or None."""
-        return self.files.get(kind)
-
     @property
     def response(self) -> Results | None:
         """The response of the baseline design, else the first; None if there is none."""

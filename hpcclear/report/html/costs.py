@@ -1,5 +1,7 @@
 """The section on accuracy against run time (kind ``accuracy``): cheapest settings and their errors."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hpcclear.report import targets
@@ -12,8 +14,6 @@ TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
 MARGIN = 100.0
 """The reference must be this many times better than what is measured against it; smaller errors are not resolved."""
-
-Rows = list[list[object]]
 
 
 def accuracy(found: Results, content: Content) -> list[object]:
@@ -30,7 +30,7 @@ def accuracy(found: Results, content: Content) -> list[object]:
 
 def _spending(found: Results) -> PageTable:
     """A row a tolerance."""
-    rows: Rows = []
+    rows: list[list[object]] = []
     with np.errstate(invalid="ignore", divide="ignore"):
         holds = found["spent_error"].values / found["spent_model"].values
     for k, rtol in enumerate(found["tolerance"].values):
@@ -64,11 +64,10 @@ def cheapest(found: Results, aim: float) -> str:
     return f"rtol {float(here['cheapest_tolerance']):.0e}, {count}, {seconds:.2g} s"
 
 
-def advice(found: Results) -> Rows:
-    """Return the cheapest method and setting for each target error of f, and what the reference resolves."""
+def advice(found: Results) -> Iterator[list[str]]:
+    """Yield the cheapest method and setting for each target error of f, and what the reference resolves."""
     here = found.sel(quantity="objective")
     error, seconds = here["error"].values, here["seconds"].values
-    rows: Rows = []
     for target in TARGETS:
         price = np.where(error <= target, seconds, np.inf)
         text = "not reached by the measured tolerances"
@@ -76,8 +75,8 @@ def advice(found: Results) -> Rows:
             m, r = np.unravel_index(price.argmin(), price.shape)
             setting = float(here["setting"][m, r])
             text = f"{here['integrator'].values[m]}, {setting:.0e}: {1e3 * price[m, r]:.3g} ms"
-        rows.append([f"{target:.0e}", text])
-    return [*rows, ["reference", resolution(found)]]
+        yield [f"{target:.0e}", text]
+    yield ["reference", resolution(found)]
 
 
 def resolution(found: Results) -> str:

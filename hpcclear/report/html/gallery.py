@@ -83,7 +83,7 @@ def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], F
             if figure.kind in one.files:
                 caption = before + figure.captioned(one.files)
                 yield figure.name, figure.kind, caption, figure.of(one.files)
-    verified = content.get("verification")
+    verified = content.files.get("verification")
     best = "" if verified is None else recommended(verified)
     yield from _of_responses(content.responses, best)
 

@@ -17,7 +17,7 @@ from hpcclear.results.content import Results
 
 def loads(content: Content) -> list[object] | None:
     """Return tables of the bearings of every stored response, torque, impacts, then remarks; None without any."""
-    verified = content.get("verification")
+    verified = content.files.get("verification")
     best = "" if verified is None else recommended(verified)
     titles = {best: "recommended", "original": "baseline"}
     every = {titles.get(name, name): one for name, one in content.responses.items()}

@@ -59,14 +59,14 @@ def timing(found: Results, content: Content) -> list[object]:
         simulated = found["samples"].values
         rate = float(simulated.sum() / found["busy"][simulated > 0].sum())
         rates.append(f"{number(rate, 3)} samples per second and core")
-    if (samples := content.get("samples")) is not None:
+    if (samples := content.files.get("samples")) is not None:
         rates.append(f"{number(float(np.sum(samples['rhs_evaluations'])), 3)} force evaluations")
     return [words, f"{'; '.join(rates).capitalize()}."] if rates else [words]
 
 
 def reproduce(content: Content) -> list[object]:
     """Command, versions and hash of the scene."""
-    found = content.get("timing")
+    found = content.files.get("timing")
     steps: list[object] = []
     if found is not None:
         steps += ["The command that made these results:", preformatted(text_in(found, "command"))]

@@ -22,7 +22,7 @@ _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. 
 
 def readings(content: Content) -> list[object] | None:
     """How far the paper's designs are from what it prints, under the possible readings of its text."""
-    found = content.get("readings")
+    found = content.files.get("readings")
     if found is None:
         return None
     far, texts = found["distance"].values if "distance" in found else np.array([]), []
@@ -36,7 +36,7 @@ def readings(content: Content) -> list[object] | None:
 
 def claims(content: Content) -> list[object] | None:
     """The paper's claims with our verdicts, the numbers of them first."""
-    found = content.get("claims")
+    found = content.files.get("claims")
     if found is None:
         return None
     verdicts = found["verdict"].values.tolist()
@@ -52,7 +52,7 @@ def claims(content: Content) -> list[object] | None:
 
 def designs_of_a_paper(content: Content) -> list[object]:
     """Words and table of the designs that a publication prints; nothing without any."""
-    verified = content.get("verification")
+    verified = content.files.get("verification")
     if verified is None or "mean_paper" not in verified:
         return []
     printed = {

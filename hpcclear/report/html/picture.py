@@ -37,7 +37,7 @@ def front(content: Content) -> dict[str, Any]:
     At first the axes are the two objectives of the case that the answer is about; where a case has others than mean and
     standard deviation of f, the reader may choose the axes. Points have no place along an axis that is no objective of their
     case."""
-    verified = content.get("verification")
+    verified = content.files.get("verification")
     if verified is None:
         return {"points": []}
     points = [_design(verified.isel(design=k)) for k in range(verified.sizes["design"])]

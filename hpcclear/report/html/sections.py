@@ -20,7 +20,7 @@ LISTED = 40  # samples listed by number before the rest is only counted
 
 def screened(found: Results, content: Content) -> list[object]:
     """What each effect changes and saves, why others are kept, and the tables of the scene without what can be neglected."""
-    seconds = effects.seconds_of(content.get("timing"))
+    seconds = effects.seconds_of(content.files.get("timing"))
     kept = json.loads(found.attrs["kept"]).items()
     return [
         _changes(found, seconds),

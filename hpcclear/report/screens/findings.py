@@ -66,7 +66,7 @@ def _unknowns(found: Results) -> list[tuple[str, str]]:
 
 def effects(found: Results, content: Content) -> Screen:
     """Return the first screen of an effect screening."""
-    seconds = screening.seconds_of(content.get("timing"))
+    seconds = screening.seconds_of(content.files.get("timing"))
     tolerance = f"{100 * float(found.attrs['tolerance']):g} %"
     chosen = int(np.argmax(found["recommended"].values))
     names, saved = screening.named(found, chosen), screening.saving(found, chosen, seconds)
