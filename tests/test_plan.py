@@ -27,11 +27,11 @@ SCENE = load_scene(JOBS / "hunt_crossley.toml").with_(
 @pytest.fixture
 def made() -> Plan:
     rows = (Row(None, SCENE, 2e-3, ""), Row(1e-3, SCENE, 1e-3, "because"))
-    return Plan(rows, 100_000, None, 3.0, 400e6, 5)
+    return Plan(rows, 100_000, None, 3.0, 400e6, 5, workers=2)
 
 
 def test_the_job_asks_for_enough(made: Plan):
-    lines = "\n".join(slurm(made, made.rows[0], 100_000, 2))
+    lines = "\n".join(slurm(made, made.rows[0]))
     hours, minutes, seconds = map(int, re.search(r"--time=(\d+):(\d+):(\d+)", lines).groups())
     asked = 3600 * hours + 60 * minutes + seconds
     assert asked >= RESERVE * made.wall_seconds(made.rows[0], 100_000, 2)

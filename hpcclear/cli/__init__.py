@@ -143,12 +143,9 @@ def main(arguments: list[str] | None = None) -> None:
             code = _refused(error)
         except (click.Abort, KeyboardInterrupt):
             code = Exit.STOPPED
-        except InputError as error:
+        except (InputError, StorageError) as error:
             say(f"Error: {error}")
-            code = Exit.BAD_INPUT
-        except StorageError as error:
-            say(f"Error: {error}")
-            code = Exit.FAILED
+            code = Exit.BAD_INPUT if isinstance(error, InputError) else Exit.FAILED
         except LimitError as error:
             end_job(f"Error: {error}", Exit.FAILED)
             code = Exit.FAILED

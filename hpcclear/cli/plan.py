@@ -1,6 +1,7 @@
 """The output of `accuracy --plan`: cost of several errors, and the job to request."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from rich import box
@@ -20,31 +21,30 @@ RESERVE = 1.5
 """Requested wall time over expected wall time."""
 
 
-def preview(plan: Plan, ranks: int) -> str:
+def preview(plan: Plan) -> str:
     """Return what the latest row means for the job, in a line: the answer so far, while the next row is measured."""
     row = plan.rows[-1]
-    simulations = plan.simulations
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
     name = f"first look, {name}" if plan.first else name
     doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
     doubts += ["probably less"] if plan.first else []
-    wall = duration(plan.wall_seconds(row, simulations, ranks))
-    text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take {wall}"
-    return f"{text} on {counted(ranks)}" + (f" ({'; '.join(doubts)})" if doubts else "")
+    wall = duration(plan.wall_seconds(row, plan.simulations, plan.workers))
+    text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {plan.simulations} simulations take"
+    return f"{text} {wall} on {counted(plan.workers)}" + (f" ({'; '.join(doubts)})" if doubts else "")
 
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
+def describe(plan: Plan, file: str, error: float | None) -> None:
     """Print the costs of several errors, the resources of the requested one, and the Slurm lines to paste."""
     out = console()
     row = next((row for row in plan.rows if row.error == error), plan.rows[0])
-    simulations = plan.simulations
+    job = plan.simulations, plan.workers
     command = "sample" if plan.study is None else "run"
     made = Table(
-        title=f"{command}: {simulations} simulations on {counted(ranks)}", title_justify="left",
+        title=f"{command}: {plan.simulations} simulations on {counted(plan.workers)}", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0),
     )  # fmt: skip
     for name in ("error of f", "settings", "ms/sample", "core-h", "wall time"):
@@ -53,14 +53,13 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     for one in plan.rows:
         reached = "as in file" if one.error is None else f"{one.error:.0e}"
         spread = f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""
-        hours = f"{plan.core_seconds(one, simulations, ranks) / 3600:.2g}"
-        wall = duration(plan.wall_seconds(one, simulations, ranks))
+        hours = f"{plan.core_seconds(one, *job) / 3600:.2g}"
+        wall = duration(plan.wall_seconds(one, *job))
         made.add_row(reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall)
     out.print(made)
-    needs = _needs(plan, row, simulations, command, ranks)
-    show_rows("The job", needs if detailed() else [one for one in needs if one[0] == ON_SCREEN])
+    show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == ON_SCREEN])
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
-    for line in slurm(plan, row, simulations, ranks):
+    for line in slurm(plan, row):
         out.print(line, markup=False, soft_wrap=True)
     place = "results/samples.nc" if command == "sample" else "results"
     line = f"srun hpcclear {command} {file} -o {place}"
@@ -68,33 +67,30 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     out.print(f"{line}{between}{overrides}", markup=False, soft_wrap=True)
 
 
-def _needs(
-    plan: Plan, row: Row, simulations: int, command: str, ranks: int
-) -> list[tuple[str, str]]:
-    memory = f"{plan.memory / 2**20:.0f} MB per rank, {simulations * 1e-6:.2g} GB more on rank 0"
-    rows = [
-        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.3g}"),
-        ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
-        ("start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"),
-        ("memory", memory),
-        ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
-    ]
+def _needs(plan: Plan, row: Row) -> Iterator[tuple[str, str]]:
+    count, ranks = plan.simulations, plan.workers
+    yield "core-seconds", f"{plan.core_seconds(row, count, ranks):.3g}"
+    yield "wall time", duration(plan.wall_seconds(row, count, ranks))
+    yield "start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"
+    memory = f"{plan.memory / 2**20:.0f} MB per rank, {count * 1e-6:.2g} GB more on rank 0"
+    yield "memory", memory
+    yield "disk", f"{plan.disk(count) / 2**20:.3g} MB"
     if row.reached:
-        rows.append(("reached", row.reached))
-    if command == "run":
-        text = f"{simulations}, and {plan.responses} single responses; rejected surrogates and tight constraints need more"
-        rows.append(("simulations", f"{text}. Single responses, fits and search run on one core"))
-        rows.append(("hpcclear sample", f"{plan.samples} simulations"))
-    return rows
+        yield "reached", row.reached
+    if plan.study is not None:
+        text = f"{count}, and {plan.responses} single responses; rejected surrogates and tight constraints need more"
+        yield "simulations", f"{text}. Single responses, fits and search run on one core"
+        yield "hpcclear sample", f"{plan.samples} simulations"
 
 
-def slurm(plan: Plan, row: Row, simulations: int, ranks: int) -> list[str]:
+def slurm(plan: Plan, row: Row) -> list[str]:
     """The head of a batch script for this job."""
-    minutes = math.ceil((RESERVE * plan.wall_seconds(row, simulations, ranks) + 120.0) / 60.0)
+    wall = plan.wall_seconds(row, plan.simulations, plan.workers)
+    minutes = math.ceil((RESERVE * wall + 120.0) / 60.0)
     memory = 256 * math.ceil(1.5 * plan.memory / 2**20 / 256)
     return [
         "#!/bin/bash",
-        f"#SBATCH --ntasks={ranks}",
+        f"#SBATCH --ntasks={plan.workers}",
         "#SBATCH --cpus-per-task=1",
         f"#SBATCH --mem-per-cpu={memory}M",
         f"#SBATCH --time={minutes // 60:02d}:{minutes % 60:02d}:00",

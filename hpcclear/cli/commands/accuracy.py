@@ -86,7 +86,7 @@ def _plan(written: cli.Written, error: float | None, workers: int | None) -> Non
         planned = ranks.size if workers is None else workers
 
         def show(plan: Plan) -> None:
-            (cli.say if plan.first else announce)(preview(plan, planned))
+            (cli.say if plan.first else announce)(preview(plan))
 
         made = measure(scene, ranks, ladder(scene, error), planned, announce, show, "auto")
-        describe(made, str(written.file), error, planned)
+        describe(made, str(written.file), error)

@@ -201,12 +201,8 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     best = float(accuracy["cheapest_tolerance"][np.abs(accuracy["aim"].values - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
         if rtol == best:
-            wide: style.Look = {
-                "color": style.colour("faint"),
-                "lw": 5.0,
-                "solid_capstyle": "round",
-            }
-            top.loglog(seconds[k], model[k], **wide)
+            wide: style.Look = {"lw": 5.0, "solid_capstyle": "round"}
+            top.loglog(seconds[k], model[k], color=style.colour("faint"), **wide)
         look = {**style.look(k), "ms": 2.8}
         top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
         top.plot(seconds[k], accuracy["spent_error"].values[k], **{**look, "ls": "none"})

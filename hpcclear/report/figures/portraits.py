@@ -23,11 +23,10 @@ def orbit_figure(response: Results) -> "style.Figure":
         x, y = (unit(shown[f"eccentricity_{c}"].sel(joint=joint)) for c in "xy")
         contact = shown["penetration"].sel(joint=joint).values > 0.0
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
-        look: style.Look = {"color": style.colour("sky"), "lw": 0.7, "label": "free flight"}
         flown = ~_rolls(angle, contact)  # the path between such instants, in pieces
         gap = np.full(len(x) - 1, np.nan)
         pieces = [np.column_stack([c[:-1], c[1:], gap])[flown].ravel() for c in (x, y)]
-        panel.plot(*pieces, **look)
+        panel.plot(*pieces, color=style.colour("sky"), lw=0.7, label="free flight")
         rolled: style.Look = {"color": style.colour("vermilion"), "lw": 0.7, "label": "contact"}
         panel.plot(*_along(radius, angle, contact), **rolled)
         _circle(panel, clearances[row])
