@@ -6,8 +6,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hpcclear.ranks.schedule import QUANTUM, HandOut
-from hpcclear.ranks.work_queue import WorkQueue
+from hpcclear.ranks.schedule import QUANTUM, HandOut, WorkQueue
 
 
 class SimulatedWorker:

@@ -11,7 +11,6 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, HandOut, Kept, PointSource, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped
 from hpcclear.ranks.team import Ranks
-from hpcclear.ranks.work_queue import WorkQueue
 
 EARLY = 1.0
 """Seconds from the beginning of a stage in which the first samples are waited for."""
@@ -81,7 +80,7 @@ class Lead:
         self._gather(until=None)
 
     def _hand_out(self, task: Task) -> None:
-        """Answer the others and work along until every sample is finished."""
+        """Answer the others, and work along for a moment at a time, until every sample is finished."""
         queue, self._spent[0, _COMPILE] = self._ranks.make_queue(task)
         backoff = Backoff()
         while not self.book.done:
@@ -90,21 +89,17 @@ class Lead:
                 backoff.reset()
             if self._ranks.stop_switch.is_set():
                 raise Stopped(self._ranks.stop_switch.reason)
-            self._work_along(queue, backoff)
+            if queue.hungry:
+                index, ask_below = self.book.grant(queue.need)
+                queue.take(index, self._points[index], ask_below)
+            if queue.idle:
+                backoff.wait()
+            else:
+                # others wait for their first samples, or share the last
+                awaited = self._present and (time.monotonic() < self._early or self.book.ending)
+                self._accept(queue.work(GLANCE if awaited else QUANTUM))
             self._spent[0, _BUSY] = queue.busy
             self.progress.refresh()
-
-    def _work_along(self, queue: WorkQueue, backoff: Backoff) -> None:
-        """Take samples oneself when it is time, and work on them for a moment; sleep if there is nothing to do."""
-        if queue.hungry:
-            index, ask_below = self.book.grant(queue.need)
-            queue.take(index, self._points[index], ask_below)
-        if queue.idle:
-            backoff.wait()
-        else:
-            # others wait for their first samples, or share the last
-            awaited = self._present and (time.monotonic() < self._early or self.book.ending)
-            self._accept(queue.work(GLANCE if awaited else QUANTUM))
 
     def _gather(self, until: float | None) -> None:
         """End the stage on every rank; after an error or a stop, do not wait for ever."""

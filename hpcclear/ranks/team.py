@@ -15,9 +15,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
-from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task
+from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task, WorkQueue
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
-from hpcclear.ranks.work_queue import WorkQueue
 
 FLUSH_INTERVAL = 1.0
 """Seconds that a finished record waits on a rank at most."""
