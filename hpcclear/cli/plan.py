@@ -30,7 +30,8 @@ def preview(plan: Plan) -> str:
     doubts += ["probably less"] if plan.first else []
     wall = duration(plan.wall_seconds(row, plan.simulations, plan.workers))
     text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {plan.simulations} simulations take"
-    return f"{text} {wall} on {counted(plan.workers)}" + (f" ({'; '.join(doubts)})" if doubts else "")
+    text = f"{text} {wall} on {counted(plan.workers)}"
+    return f"{text} ({'; '.join(doubts)})" if doubts else text
 
 
 def _percent(share: float) -> str:

@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, moving, style
 from hpcclear.results import files
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 RATE = 25
 """Frames a second: a frame takes 40 ms, which a GIF can say."""
@@ -136,7 +136,7 @@ class _Mechanism:
 def _forces(axes: "style.Axes", shown: Results) -> Any:
     """Contact forces over the revolutions, and the line that marks the instant."""
     unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
-    for row, joint in enumerate(motion.joints(shown)):
+    for row, joint in enumerate(texts_in(shown, "joint")):
         force = unit(shown["contact_force"].sel(joint=joint))
         axes.plot(turn, force, color=style.colour(row), lw=0.8, label=labels.literal(joint))
     style.key(axes, "above")

@@ -73,11 +73,6 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
     return response.isel(time=np.flatnonzero(inside))
 
 
-def joints(response: Results) -> list[str]:
-    """Labels of the joints of a response."""
-    return texts_in(response, "joint")
-
-
 def pins(response: Results) -> list[str]:
     """Labels of the joints of a response that are no corners of sliders in guides."""
     return [label for label in texts_in(response, "joint") if "." not in label]
@@ -93,7 +88,7 @@ def of_pins(response: Results) -> Results:
 
 def quantities(response: Results) -> list[tuple[str, str, str]]:
     """What responses are compared by: variable, joint or "", words."""
-    named = enumerate(joints(response), 1)
+    named = enumerate(texts_in(response, "joint"), 1)
     found = [("contact_force", label, f"contact force {k} ({label})") for k, label in named]
     found.append(("crank_moment", "", "torque of the drive"))
     if "slider_acceleration" in response:

@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 
 @style.figure("journal-centre orbits in the clearance circle", 10)
@@ -15,7 +15,7 @@ def orbit_figure(response: Results) -> "style.Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight, over the later half of the
     revolutions of a response (kind ``response``)."""
     shown = motion.of_pins(motion.steady(response))
-    joints = motion.joints(shown)
+    joints = texts_in(shown, "joint")
     figure, axes = style.side_by_side(len(joints), min(style.across(), style.WIDTH))
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = unit(motion.clearances(shown))
@@ -44,7 +44,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
     from matplotlib.colors import ListedColormap
 
     shown = motion.steady(response)
-    joints = motion.joints(shown)
+    joints = texts_in(shown, "joint")
     polar = {"projection": "polar"}
     figure, axes = style.grid(len(joints), 1, 0.97 * style.across() * len(joints), subplot_kw=polar)
     force = labels.of(shown["contact_force"])
@@ -109,7 +109,7 @@ def poincare_figure(response: Results, revolutions: int | None = None) -> "style
     the response has, the more it says.
     """
     shown = motion.steady(response, revolutions)
-    joints = motion.joints(shown)
+    joints = texts_in(shown, "joint")
     cells = [["motion"] * max(len(joints), 1), joints or ["."]]
     figure, axes = style.mosaic(cells, 118.0, height_ratios=[1.1, 1.0])
     top, panels = axes["motion"], [axes[joint] for joint in joints]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import cast
 
 from hpcclear.report.figures import designs, labels, motion, style
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 
 @style.drawn
@@ -21,7 +21,7 @@ def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure
         word = "torque of the drive" if name == "crank_moment" else name.replace("_", " ")
         unit = labels.of(shown[name])
         if "joint" in shown[name].dims:
-            for row, joint in enumerate(motion.joints(shown)):
+            for row, joint in enumerate(texts_in(shown, "joint")):
                 force, width = unit(shown[name].sel(joint=joint)), max(0.8 - 0.2 * row, 0.4)
                 look: style.Look = {"color": style.colour(row), "lw": width}  # later ones on top
                 panel.plot(motion.turns(shown), force, label=joint, **look)
@@ -38,7 +38,7 @@ def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure
 def penetration_figure(response: Results) -> "style.Figure":
     """Penetration of the joints over the last two revolutions of a response (kind ``response``)."""
     shown = motion.latest(response)
-    joints = motion.joints(shown)
+    joints = texts_in(shown, "joint")
     figure, axes = style.grid(len(joints), 1, 40.0 * len(joints), sharex=True, sharey=True)
     unit = labels.of(shown["penetration"])
     for row, (panel, joint) in enumerate(zip(axes[:, 0], joints, strict=True)):

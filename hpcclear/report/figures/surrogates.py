@@ -34,9 +34,8 @@ def sensitivity_figure(sensitivity: Results) -> "style.Figure":
         fits.mark(panel, known[surface], 0.12)
         _sensitivity_panel(panel, sensitivity.sel(surface=surface), across, unit)
         panel.set_title(f"surface in {_surface(surface)}")
-    for panel in axes[:, 0]:
-        panel.set_ylabel(unit.label("slope × range"))
-    _finish_grid(axes, len(surfaces), across.label(_held(sensitivity)))
+    words = across.label(_held(sensitivity)), unit.label("slope × range")
+    _finish_grid(axes, len(surfaces), *words)
     return figure
 
 
@@ -216,9 +215,8 @@ def parity_figure(kriging: Results) -> "style.Figure":
     for panel in axes.flat:
         panel.plot(ends, ends, color=style.colour("ink"), lw=0.5, zorder=0)
         panel.set(xlim=ends, ylim=ends, aspect="equal")
-    for panel in axes[:, 0]:
-        panel.set_ylabel(unit.label("$f$ by the surrogate"))
-    _finish_grid(axes, len(found), unit.label("$f$ by the dynamics"))
+    words = unit.label("$f$ by the dynamics"), unit.label("$f$ by the surrogate")
+    _finish_grid(axes, len(found), *words)
     return figure
 
 
@@ -245,11 +243,13 @@ def symbol(name: str) -> str:
     return labels.entry(name)
 
 
-def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
-    """Label the lowest panel of each column and take the unused ones away."""
+def _finish_grid(axes: np.ndarray, used: int, across: str, up: str) -> None:
+    """Label the lowest panel of each column and the first of each row, and take the unused ones away."""
+    for panel in axes[:, 0]:
+        panel.set_ylabel(up)
     for panel in axes.flat[used:]:
         panel.remove()
     columns = axes.shape[1]
     for k in range(max(used - columns, 0), used):
-        axes.flat[k].set_xlabel(label)
+        axes.flat[k].set_xlabel(across)
         axes.flat[k].tick_params(labelbottom=True)

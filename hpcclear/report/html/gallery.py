@@ -16,7 +16,7 @@ from hpcclear.report.html.guard import attempt
 from hpcclear.report.merit import recommended
 from hpcclear.report.parts import FigureOf, declared
 from hpcclear.report.screen import upper
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, texts_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -135,7 +135,7 @@ def _clearances(*responses: Results) -> str:
     if any("penetration" not in one for one in responses):  # of ideal joints
         return ""
     parts, known = list[str](), np.array([motion.clearances(one) for one in responses]).T
-    for name, own in zip(motion.joints(responses[0]), known, strict=True):
+    for name, own in zip(texts_in(responses[0], "joint"), known, strict=True):
         shown = {labels.quantity(float(c), "m") for c in own if np.isfinite(c)}
         if len(shown) == 1:
             parts.append(f"{shown.pop()} in {name}")

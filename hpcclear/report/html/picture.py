@@ -10,7 +10,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 from hpcclear.report.merit import goals_of, leading_goals, recommended
 from hpcclear.report.screens.study import simulated
-from hpcclear.results.content import Results, text_in
+from hpcclear.results.content import Results, text_in, texts_in
 
 _WORDS = {"mean": "mean", "deviation": "standard deviation"}
 _USUAL = tuple(f"{words} of f" for words in _WORDS.values())
@@ -162,7 +162,7 @@ def frames(response: Results, before: Results) -> dict[str, Any]:
         "angles": _digits(angles),
         "still": [bool(one) for one in still],
         "pairs": moving.pairs(points, e),
-        "joints": motion.joints(held),
+        "joints": texts_in(held, "joint"),
         "clearance": np.nan_to_num(motion.clearances(held)).tolist(),
         "turn": _digits(motion.turns(shown)),
         "e": _digits(e.reshape(len(e), -1)),
