@@ -37,7 +37,7 @@ def reference_of(scene: Scene, designs: int) -> Reference:
     """
     made = systems(scene, designs)
     values = np.array([solve_turn(scene, one, "DOP853", REFERENCE_RTOL)[0] for one in made])
-    method = kernel_method("second", scene, designs, 1, formulation="minimal", method="tsitouras")
+    method = kernel_method("second", scene, designs, 1, "minimal", "tsitouras")
     second = method.prepare(REFERENCE_RTOL)[0]().values
     second[:, 2] = [solve_turn(scene, one, "LSODA", 10 * REFERENCE_RTOL)[0][2] for one in made]
     scale = np.abs(values)

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -92,12 +91,15 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Sce
 # ---- the kernel's own methods -------------------------------------------------------------------
 
 
-def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics: Any) -> Integrator:
+def kernel_method(
+    name: str, scene: Scene, designs: int, width: int, formulation: str, method: str
+) -> Integrator:
     """A method of the kernel. Raises InputError if this scene cannot be integrated so."""
-    problem_of(one_turn(scene, **numerics))  # refuses what there is not
+    scene = one_turn(scene, formulation=formulation, method=method)
+    problem_of(scene)  # refuses what there is not
 
     def prepare(rtol: float) -> tuple[Run, float]:
-        here = one_turn(scene, rtol, **numerics)
+        here = one_turn(scene, rtol)
         problem = problem_of(here)
         par = parameters(here, neighbours(here, designs))
         start = start_states(here, par)
@@ -250,9 +252,8 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Integrator]:
         wanted += [("radau", 1, "minimal", "radau"), ("baumgarte", 1, "baumgarte", "tsitouras")]
     found = []
     for name, width, formulation, method in wanted:
-        how = {"formulation": formulation, "method": method}
         with suppress(InputError):  # not for this scene
-            found.append(kernel_method(name, scene, designs, width, **how))
+            found.append(kernel_method(name, scene, designs, width, formulation, method))
     return found + [outside_method(scene, designs, name) for name in ("DOP853", "LSODA")]
 
 

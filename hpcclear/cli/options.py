@@ -15,7 +15,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
 from hpcclear.ranks.launcher import launched_rank
 from hpcclear.ranks.stopping import StopSwitch
-from hpcclear.ranks.terminal import clear, write
+from hpcclear.ranks.terminal import Style, clear, write
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Options
@@ -50,7 +50,7 @@ def directory_option(words: str) -> Callable[[FC], FC]:
     return option("-o --output", words, type=PATH, required=True)
 
 
-def option(usage: str, words: str, shown: Any = None, **more: Any) -> Callable[[FC], FC]:
+def option(usage: str, words: str, shown: object = None, **more: Any) -> Callable[[FC], FC]:
     """An option as its usage has it, such as "--size LENGTH"; repeatable where its words say so.
 
     `shown`: a default that the help prints. Further arguments: of `click.option`, and `name`, of the command's parameter where
@@ -132,7 +132,7 @@ class How(NamedTuple):
     fresh: bool
     time_limit: float | None
     interval: float
-    progress: Any
+    progress: Style
 
     def options(self) -> "Options":
         """The same for a session of a run, but for the time limit, which is the process's."""
@@ -141,7 +141,7 @@ class How(NamedTuple):
         return Options(self.fresh, self.interval, self.progress)
 
 
-GATHERED: dict[str, Any] = {"written": Written, "how": How}
+GATHERED: dict[str, type[Written] | type[How]] = {"written": Written, "how": How}
 """Arguments of commands, and what they are gathered of."""
 
 

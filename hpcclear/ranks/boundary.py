@@ -15,7 +15,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from types import ModuleType
 
 from hpcclear.base.errors import InputError, LimitError, StorageError, check_address_space, mendable
 from hpcclear.base.extras import installing
@@ -189,7 +189,7 @@ def describe_mpi() -> str:
     return " ".join(lines[0].replace("Version:", "").split())
 
 
-def _load_mpi() -> Any:
+def _load_mpi() -> ModuleType:
     try:
         import mpi4py
 

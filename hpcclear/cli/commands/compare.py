@@ -2,14 +2,14 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from hpcclear.cli import options as cli
 
 if TYPE_CHECKING:
-    from hpcclear.report.compare import ComparedSignal
+    from hpcclear.report.compare import Alignment, ComparedSignal
 
 
 MOST = 16
@@ -30,7 +30,7 @@ MOST = 16
 )  # fmt: skip
 @cli.DETAILS
 def run(
-    file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]
+    file: Path, measured: Path, output: Path | None, align: "Alignment", names: tuple[str, ...]
 ) -> None:
     """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
 

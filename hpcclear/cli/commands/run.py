@@ -1,9 +1,9 @@
 """`run`: a whole study."""
 
 from pathlib import Path
-from typing import Any
 
 from hpcclear.cli import options as cli
+from hpcclear.ranks.terminal import Style
 
 
 @cli.command("compute", "Run a complete study.", ranks=True)
@@ -13,7 +13,7 @@ from hpcclear.cli import options as cli
 @cli.LIMIT
 @cli.PROGRESS
 def run(
-    written: cli.Written, output: Path, fresh: bool, time_limit: float | None, progress: Any
+    written: cli.Written, output: Path, fresh: bool, time_limit: float | None, progress: Style
 ) -> None:
     """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
@@ -26,6 +26,7 @@ def run(
         from hpcclear.report.html.content import read
         from hpcclear.study import run_study
 
-        how = {"fresh": fresh, "progress_style": progress, "notify": cli.say}
-        place = run_study(scene, cli.place_of(output), ranks, **how)
+        place = run_study(
+            scene, cli.place_of(output), ranks, fresh=fresh, progress_style=progress, notify=cli.say
+        )
         describe(read(place), place / "verification.nc")

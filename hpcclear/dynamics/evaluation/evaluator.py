@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -276,7 +275,7 @@ def outcome_records(
         largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
         known[RATE] = objective.made_of(outcome.mean_rate, largest, outcome.revolution[:, None])
     for name, values in known.items():
-        there: Any = (valid, *map(slice, record[name].shape))
+        there = (valid, *map(slice, record[name].shape))
         records[name][valid] = values[there]
     latched = outcome.latched == 1.0
     records["latched"] = (latched & valid[:, None])[:, : records["latched"].shape[1]]

@@ -1,5 +1,6 @@
 """Figures of one response (kind ``response``) without a time axis: orbits, forces by direction, phase space."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,9 @@ def phase_figure(response: Results) -> "style.Figure":
     return figure
 
 
-def _bar(figure: "style.Figure", drawn: Any, panels: Any, words: str) -> Any:
+def _bar(
+    figure: "style.Figure", drawn: Any, panels: "Sequence[style.Axes] | np.ndarray", words: str
+) -> Any:
     """The colour bar below all panels."""
     look: style.Look = {"location": "bottom", "aspect": 50, "pad": 0.02, "label": words}
     return figure.colorbar(drawn, ax=list(panels), **look)

@@ -68,7 +68,7 @@ def _of_arrays(kind: str, arrays: Mapping[str, np.ndarray]) -> Results:
         raise InputError(kind, sorted(arrays), reason, remedy) from None
 
 
-def several(response: Any) -> dict[str, Results]:
+def several(response: object) -> dict[str, Results]:
     """Return several responses by the names of their designs; none where there is only one."""
     if isinstance(response, Results) and "design" in response.sizes:
         names = response.labels.get("design", np.arange(1, response.sizes["design"] + 1))

@@ -3,6 +3,7 @@
 No figure names a size, a font or a colour by itself, so that a style sheet of a user can say another.
 """
 
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,7 +79,7 @@ RC: dict[str, Any] = {
 }  # fmt: skip
 
 
-def matplotlib() -> Any:
+def matplotlib() -> ModuleType:
     """The matplotlib module. Raises InputError if it is not installed; the message names the extra that brings it."""
     try:
         import matplotlib as module

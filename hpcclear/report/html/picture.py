@@ -128,7 +128,7 @@ def _predicted(one: Results) -> list[list[str]]:
     ]
 
 
-def series(response: Results) -> list[dict[str, Any]]:
+def series(response: Results) -> list[dict[str, object]]:
     """Curves of the last two revolutions: turns of the drive from 0, values in readable units."""
     shown = motion.latest(response, 2)
     every = max(1, shown.sizes["time"] // POINTS)
@@ -143,7 +143,7 @@ def series(response: Results) -> list[dict[str, Any]]:
     return found
 
 
-def frames(response: Results, before: Results) -> dict[str, Any]:
+def frames(response: Results, before: Results) -> dict[str, object]:
     """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs; which bodies differ from
     those of the response before."""
     shown = motion.latest(response, 2)
@@ -170,7 +170,7 @@ def frames(response: Results, before: Results) -> dict[str, Any]:
     }
 
 
-def _digits(values: np.ndarray) -> Any:
+def _digits(values: np.ndarray) -> object:
     """Numbers for the page: six digits."""
     flat = [float(f"{value:.6g}") for value in np.ravel(values)]
     return np.reshape(flat, np.shape(values)).tolist()
