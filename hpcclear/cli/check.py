@@ -1,7 +1,7 @@
 """What the command `check` prints: effects, states, the study, and the measured run time of a sample."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -161,37 +161,33 @@ def _mpi(ranks: "Ranks | None") -> str:
     return f"{text}; {crowded}: more ranks than cores are slower"
 
 
-def _study_rows(scene: Scene) -> list[tuple[str, str]]:
-    study = scene.study
-    assert study is not None
-    rows = [
-        ("samples", f"{study.samples} ({DRAWN[study.method]}), seed {study.seed}"),
-        ("objective", f"{study.objective}: {scene.objective.words}"),
-    ]
+def _study_rows(scene: Scene) -> Iterator[tuple[str, str]]:
+    study = scene.required_study
+    yield "samples", f"{study.samples} ({DRAWN[study.method]}), seed {study.seed}"
+    yield "objective", f"{study.objective}: {scene.objective.words}"
     if not detailed():
         short = {"variables": study.variables, "random": (*study.random, *study.worn)}
         for label, named in short.items():
-            names = _few([one.name for one in named], 20).replace(";", ",")
-            rows += [(label, names)] if names else []
-        return rows
-    rows += [(one.name, text) for one in study.variables if (text := _ranged(scene, one))]
+            if named:
+                yield label, _few([one.name for one in named], 20).replace(";", ",")
+        return
+    yield from ((one.name, text) for one in study.variables if (text := _ranged(scene, one)))
     for row in study.random:
         if row.parameters is not None:
             least, most = (scene.in_unit(end, scene.unit(row.paths[0])) for end in row.span)
             about = "" if row.absolute else " about the design"
-            rows.append((f"{row.name} random", f"{row.shape_words}, {least} to {most}{about}"))
+            yield f"{row.name} random", f"{row.shape_words}, {least} to {most}{about}"
     if any(case.kept for case in study.cases):
         from hpcclear.study import verdicts
 
-        rows += [("constraint", text) for text in verdicts.costs(study, scene.objective.unit)]
+        yield from (("constraint", text) for text in verdicts.costs(study, scene.objective.unit))
     for row in study.worn:
         from hpcclear.study import lives
 
         assert scene.wear is not None  # by validation
         text = f"clearance after {row.cycles:g} revolutions of {scene.wear.lives} service lives, "
         text += f"simulated first (about {lives.simulations(scene)} simulations)"
-        rows.append((f"{row.name} random", text))
-    return rows
+        yield f"{row.name} random", text
 
 
 def _ranged(scene: Scene, one: StudyVariable) -> str:
@@ -211,7 +207,7 @@ def _ranged(scene: Scene, one: StudyVariable) -> str:
     return f"{one.ratio[0]:g} to {one.ratio[1]:g}: {one.ratio_words}" if one.ratio else ""
 
 
-def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
+def _cost_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
     from hpcclear.dynamics.evaluation import evaluate_records
     from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
@@ -226,15 +222,13 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     start = time.perf_counter()
     evaluate_records(scene, columns)
     each = (time.perf_counter() - start) / DEFAULT_LANES
-    evaluations = int(record["rhs_evaluations"])
-    rows = [("f, steady mean", in_a_line(record))] if record["regime"] else []
-    rows += [
-        ("run time", f"{each * 1e3:.3g} ms per sample on one core ({DEFAULT_LANES} per batch)"),
-        ("evaluations", f"{evaluations} of the forces"),
-        ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
-    ]
+    if record["regime"]:
+        yield "f, steady mean", in_a_line(record)
+    yield "run time", f"{each * 1e3:.3g} ms per sample on one core ({DEFAULT_LANES} per batch)"
+    yield "evaluations", f"{int(record['rhs_evaluations'])} of the forces"
+    yield "compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"
     if scene.study is None:
-        return rows
+        return
     whole = 0
     if scene.study.cases:
         from hpcclear.base.objectives import asked
@@ -244,11 +238,10 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
             return asked(evaluate_records(scene, points), scene.objective)
 
         whole, each = expected(scene, evaluated, each)
-    rows.append(("hpcclear sample", _all(scene.study.samples, each)))
+    yield "hpcclear sample", _all(scene.study.samples, each)
     if whole:
         text = f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan"
-        rows.append(("hpcclear run", text))
-    return rows
+        yield "hpcclear run", text
 
 
 def _all(count: int, each: float) -> str:
@@ -265,8 +258,8 @@ def describe_corners(scene: Scene, simulate: bool) -> None:
     show_rows("Corners of the study's ranges", lines(tried(scene, simulate), simulate))
 
 
-def lines(found: "CornerOutcomes", simulate: bool) -> list[tuple[str, str]]:
-    """Return label and text of each line on the corners of a study's ranges."""
+def lines(found: "CornerOutcomes", simulate: bool) -> Iterator[tuple[str, str]]:
+    """Yield label and text of each line on the corners of a study's ranges."""
     from hpcclear.ensemble.corners import MOST
 
     points, total = found.points, len(found.points)
@@ -274,9 +267,9 @@ def lines(found: "CornerOutcomes", simulate: bool) -> list[tuple[str, str]]:
     does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
     every = total < MOST or total == 2 ** len(points.names)
     which = "all corners" if every else "a balanced selection"
-    rows = [("corners", f"{total} ({which}): {total - bad} {does}")]
+    yield "corners", f"{total} ({which}): {total - bad} {does}"
     if not bad:
-        return rows
+        return
     from hpcclear.report import failures  # loads what reads results
 
     units = ((name, unit or "1") for name, unit in points.units.items())
@@ -285,6 +278,6 @@ def lines(found: "CornerOutcomes", simulate: bool) -> list[tuple[str, str]]:
         hit = np.array([found.refused.get(row) == reason for row in range(total)])
         place = failures.where(hit, columns)
         text = f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}"
-        rows.append(("refused", text))
-    failed = failures.sentences(found.status, columns, "corners") if simulate else ()
-    return rows + [("failed", text) for text in failed]
+        yield "refused", text
+    for text in failures.sentences(found.status, columns, "corners") if simulate else ():
+        yield "failed", text

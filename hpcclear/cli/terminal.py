@@ -2,6 +2,7 @@
 
 import sys
 import textwrap
+from collections.abc import Iterable
 
 import click
 
@@ -16,14 +17,15 @@ def print_remark(label: str, text: str) -> None:
     click.echo(click.style(f"{label}:", fg="yellow") + whole.removeprefix(f"{label}:"))
 
 
-def show_rows(title: str, rows: list[tuple[str, str]]) -> None:
+def show_rows(title: str, found: Iterable[tuple[str, str]]) -> None:
     """Print what and its value in two columns, with ``--details`` under a title."""
+    rows = list(found)
     if detailed():
         from hpcclear.cli.tables import console, table
 
         console().print(table(title, rows))
         return
-    width = max(15, *(len(label) for label, _ in rows)) if rows else 15
+    width = max([15, *(len(label) for label, _ in rows)])
     for label, text in rows:
         lines = textwrap.wrap(fitting(text), WIDTH - width - 2, break_on_hyphens=False)
         for k, line in enumerate(lines or [""]):
