@@ -118,9 +118,17 @@ def test_inputs_halved_together_bring_what_brute_force_says(seed):
     exact = 1.0 - of(less).std() / of(x).std()
     value, error = found.together(chosen)
     assert value == pytest.approx(exact, abs=4.0 * error + 2e-3)
-    names, falls = [f"x{k}" for k in range(size)], (found.halved, found.halved_error)
-    words = scatter._first(names, *falls, np.array([]), [value, error])
-    assert abs(float(re.search(r"by (\d+) %", words)[1]) / 100.0 - exact) < 0.02
+    data = {
+        "contribution": found.halved,
+        "halved": found.halved,
+        "halved_error": found.halved_error,
+    }
+    own = xr.Dataset(
+        {name: ("input", numbers) for name, numbers in data.items()}
+        | {"halved_together": value, "halved_together_error": error},
+        {"input": [f"x{k}" for k in range(size)]},
+    )
+    assert abs(float(re.search(r"by (\d+) %", scatter.tighten(own))[1]) / 100.0 - exact) < 0.02
     if seed % 2 == 0:  # the sum of all scatters half as much, however its parts are correlated
         assert found.together(range(size))[0] == pytest.approx(0.5, abs=1e-3)
 

@@ -81,13 +81,11 @@ class Panels:
 
     def panel(self, name: str, work: Callable[[], Variables]) -> None:
         """Add the variables of a panel."""
-        self.values.update(self.kept(name, work))
-        self._show(self.content(whole=False))
+        self._add(self.kept(name, work))
 
-    def timed_panel(self, name: str, work: Callable[[], Variables]) -> None:
-        """The same of work that is no stage by itself."""
-        with self.ranks.stage(name):
-            self.panel(name, work)
+    def _add(self, found: Variables) -> None:
+        self.values.update(found)
+        self._show(self.content(whole=False))
 
     def content(self, *, whole: bool = True) -> Results:
         """Kind ``accuracy``, of all that is there."""
@@ -118,16 +116,12 @@ class Panels:
         if found is None:
             self.notify("tolerance and revolutions")
         else:
-            self._shown(run)
+            self._add(spending.analyse(run))
         with self.ranks.stage("spending"):
             until, check = self.profile.segments, self.ranks.raise_if_stopped
             for longer in spending.measure(self.scene, run, until, check):
                 self._save("copies", vars(longer))
-                self._shown(longer)
-
-    def _shown(self, run: spending.Run) -> None:
-        self.values.update(spending.analyse(run))
-        self._show(self.content(whole=False))
+                self._add(spending.analyse(longer))
 
     def add_study(self) -> None:
         """Surrogates and random inputs: their simulations are kept apart from what follows from them."""
@@ -193,8 +187,10 @@ def measure(
     surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
     panels.add_motion()
     panels.add_spending()
-    panels.timed_panel("integration", lambda: integration.measure(scene, profile, panels.notify))
-    panels.timed_panel("averaging", lambda: averaging.measure(scene, profile))
+    with ranks.stage("integration"):
+        panels.panel("integration", lambda: integration.measure(scene, profile, panels.notify))
+    with ranks.stage("averaging"):
+        panels.panel("averaging", lambda: averaging.measure(scene, profile))
     panels.add_study()
     return panels.content()
 

@@ -1,6 +1,6 @@
 """Lines on the scatter of f: what contributes to it at one design and over the ranges, what tighter tolerances bring, chaos."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -65,20 +65,14 @@ def tighten(own: Results) -> str:
     """Return which inputs of a design (of kind ``contributions``) to tighten first, and by how much the scatter then falls; ""
     where there are not several."""
     names, falls, errors, rows = _inputs(own, "halved")
+    if len(rows) < 2:
+        return ""
     prices = own["halving_cost"].values[rows] if "halving_cost" in own else np.array([])
-    joint = [number_in(own, f"halved_together{end}") for end in ("", "_error")]
-    return _first(names, falls, errors, prices, joint) if len(rows) > 1 else ""
-
-
-def _first(
-    names: list[str], falls: Array, errors: Array, prices: Array, joint: Sequence[float]
-) -> str:
-    """The same of inputs by their names; `joint`: by how much the scatter falls, and its error."""
     chosen, known = to_tighten(falls, errors, prices)
     if not chosen:
         return "none: no single input makes a significant part of the scatter"
     listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
-    fall, error = joint
+    fall, error = (number_in(own, f"halved_together{end}") for end in ("", "_error"))
     if not np.isfinite(fall):
         return listed  # a file of an earlier version lacks it
     text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "

@@ -8,7 +8,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results
-from hpcclear.scene import Scene
 
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Relative errors of f that are put in words."""
@@ -94,29 +93,20 @@ def seconds(value: float) -> str:
 def settings(found: Results) -> Way | None:
     """Return what the scene's own settings cost and reach.
 
-    None if the file does not have them as numbers, the panel of averaging is not there, or their tolerance is not between
-    those that were measured.
+    The error of a single run is that of the next looser tolerance, shorter transient and shorter average that were measured: no
+    more is known, and so it is not below the cheapest of these. None if the file does not have the settings as numbers, the
+    panel of averaging is not there, or their tolerance is not between those that were measured.
     """
     scene = scene_of(found)
     if scene is None:
         return None
-    numerics = scene.numerics
+    numerics, tolerance = scene.numerics, found["tolerance"].values
     if numerics.target_error is not None:
         way = cheapest(found, numerics.target_error)
         return way and way._replace(words=f"target_error {_short(numerics.target_error)}")
-    if not isinstance(numerics.averaged_revolutions, int):
-        return None
-    return _own(found, scene)
-
-
-def _own(found: Results, scene: Scene) -> Way | None:
-    """A single run at the tolerance and over the revolutions of a scene.
-
-    Its error is that of the next looser tolerance, shorter transient and shorter average that were measured: no more is known,
-    and so it is not below the cheapest of these.
-    """
-    numerics, tolerance = scene.numerics, found["tolerance"].values
     waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
+    if not isinstance(averaged, int):
+        return None
     near = 1.0 + 1e-9  # as it was written and as it was measured
     looser = np.flatnonzero(tolerance * near >= numerics.rtol)
     if "averaging_error" not in found or not len(looser) or numerics.rtol * near < tolerance.min():

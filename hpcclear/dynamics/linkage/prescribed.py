@@ -72,7 +72,12 @@ def prescribed_motion(
         remedy = "Prescribe one angle for each degree of freedom, and make all joints ideal"
         raise InputError("drives", freedom(mechanism), reason, remedy)
     assembly, times = assemble(mechanism), np.asarray(times, float)
-    return _motion(assembly, _passed(assembly, times, gravity), times, gravity, curves or {})
+    passage = _passed(assembly, times, gravity)
+    shown, filled = _beside(passage, times)
+    rows = cartesian(assembly, passage, *passage.at(shown), shown)
+    q, v = np.moveaxis(rows, 0, -1)
+    check_ranks(assembly.loops, q, v, shown)
+    return _reactions(assembly, shown, rows, gravity, curves or {}).at(times, filled)
 
 
 def _passed(assembly: Assembly, times: Array, gravity: float = 0.0) -> Passage:
@@ -213,17 +218,6 @@ def _beside(passage: Passage, times: Array) -> tuple[Array, Callable[[Array], Ar
         return found
 
     return shown, filled
-
-
-def _motion(
-    assembly: Assembly, passage: Passage, times: Array, gravity: float, curves: Curves
-) -> Prescribed:
-    """Motion and reactions at instants (t,)."""
-    shown, filled = _beside(passage, times)
-    rows = cartesian(assembly, passage, *passage.at(shown), shown)
-    q, v = np.moveaxis(rows, 0, -1)
-    check_ranks(assembly.loops, q, v, shown)
-    return _reactions(assembly, shown, rows, gravity, curves).at(times, filled)
 
 
 def _reactions(

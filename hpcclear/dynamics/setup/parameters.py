@@ -222,8 +222,7 @@ def has_waves(scene: Scene) -> bool:
 def with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
     """Parameters (m, PARAMETERS) with the waves of surfaces that are out of round, and thresholds of wear; of joints without
     the former are 0."""
-    rows = np.zeros((len(p), at.FURTHER))
-    rows[:, : p.shape[1]] = p
+    rows = np.pad(p, ((0, 0), (0, at.FURTHER - p.shape[1])))
     for joint in scene.pins():
         own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
         paths = wave_paths(scene, joint)
@@ -292,8 +291,7 @@ def with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
 
     Raises InputError if samples differ in length over diameter of such a film.
     """
-    rows = np.zeros((len(p), further_rows(scene)))
-    rows[:, : p.shape[1]] = p
+    rows = np.pad(p, ((0, 0), (0, further_rows(scene) - p.shape[1])))
     for joint, further in _solved_films(scene).items():
         key, table = scene.joint_key(joint), scene.pin(joint)
         ratio = 0.5 * table.film.length / table.bearing_radius  # type: ignore[union-attr]
