@@ -19,8 +19,8 @@ import numpy as np
 from scipy.stats import qmc
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-from threadpoolctl import threadpool_limits
 
+from hpcclear.base.threads import one_thread
 from hpcclear.statistics.surrogate.fitting import (
     LENGTH_BOUNDS,
     NOISE_BOUNDS,
@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument("part", nargs="*", choices=[*parts, []], default=[])
     parser.add_argument("--seeds", type=int, default=3)
     words = parser.parse_args()
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         for name in words.part or parts:
             print(f"{name}:", flush=True)
             parts[name](words.seeds)

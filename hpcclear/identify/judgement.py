@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.threads import one_thread
 from hpcclear.identify.features import Layout, sensed
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import LEVELS, Calibration, Model
@@ -90,7 +90,7 @@ def members_of(
     return np.concatenate(values, 1), np.concatenate(variances, 1)
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads change the last bits
+@one_thread()
 def prepare(
     ensemble: Ensemble, layouts: Sequence[Layout], sensor: Sensor, frequency: float, variance: Array,
     seed: int, members: int = CALIBRATED,
@@ -124,7 +124,7 @@ def as_measured(features: Array, own: Array, variance: Array, rng: np.random.Gen
 
 def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTICLES) -> Judgement:
     """Return what the features (p,) of a measurement say."""
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         rng = np.random.default_rng([seed, 0x706F])
         summaries = prepared.summarised(values)
         mean = prepared.centre + prepared.unit * prepared.expected(summaries)

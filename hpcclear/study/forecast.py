@@ -17,6 +17,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.base.threads import one_thread
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
@@ -147,8 +148,6 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     worn clearances are needed that are not known yet, these are `hpcclear.study.extent.samples_of` and `seconds`, the cost
     as far as it is known without a pilot. `evaluate`: from points to records of the study's objective.
     """
-    from threadpoolctl import threadpool_limits
-
     study, samples = scene.required_study, extent.samples_of(scene)
     loads = extent.loads_of(scene)
     most = int(LONGEST / max(seconds * loads, 1e-9))
@@ -161,7 +160,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         return sum(samples.values()), seconds
     pilot, counts = _Pilot(scene, evaluate), Counter[str]()
     try:
-        with threadpool_limits(limits=1, user_api="blas"):
+        with one_thread():
             for k in range(times):
                 own = scene.with_({"study.seed": study.seed + k}) if k else scene
                 run = _Run(own, Path(), alone(), cast(Checkpoint, None), pilot, lambda text: None)

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hpcclear.base.threads import one_thread
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.case_search import CaseSearch, lengthened
 from hpcclear.study.optimisation import Choice
@@ -41,15 +42,13 @@ def searched(
     run: StudyRun, start: Sequence[Choice], models: Sequence[Piecewise] = ()
 ) -> tuple[list[Choice], list[str]]:
     """The designs and remarks of `search`, from surrogates of f and of further responses, if there are any."""
-    from threadpoolctl import threadpool_limits
-
     if not run.study.verification.infill_rounds:
         return [], []
     searches = [
         CaseSearch(run, case, [one for one in start if one.case == case.name], models)
         for case in run.study.cases
     ]
-    with threadpool_limits(limits=1, user_api="blas"):  # the same bits, and faster
+    with one_thread():
         while asked := [(one, rows) for one in searches if len(rows := one.ask())]:
             lengthened(run, asked)
             for one, _ in asked:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcclear.base.threads import one_thread
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
@@ -69,8 +70,6 @@ def fit_kriging(
     values, whose length scales and variances are one more starting point. Raises InputError: points outside
     the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
-    from threadpoolctl import threadpool_limits
-
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     needed = points.shape[-1] + 3  # length scales, signal, noise, mean
     labels, valid = checked_samples(points, values, bounds, names, needed)
@@ -90,8 +89,7 @@ def fit_kriging(
         last = np.array([like.signal_variance, *like.length_scales, like.noise_variance])
         starts.append(np.clip(last, *box.T))
     seed = int(rng.integers(2**31))
-    # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         found = maximise(
             unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, shares=known[valid]
         )  # fmt: skip

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array
@@ -125,20 +125,22 @@ class Kriging:
         """
         points = inside(points, self.names, self.lower, self.upper)
         cross = self._covariance(self.to_unit(self.inputs), self.to_unit(points))
-        known = np.einsum("ij,ij->j", cross, cho_solve(self._factor, cross))
+        steps = solve_triangular(self._factor, cross, lower=True)
+        known = np.einsum("ij,ij->j", steps, steps)
         return self.scale**2 * np.maximum(self.signal_variance - known, 0.0)
 
     def covariance(self, points: np.ndarray) -> np.ndarray:
         """Joint Kriging covariance (n, n) of the smooth part at points (n, d), in squared units of the training values."""
         unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
         cross = self._covariance(self.to_unit(self.inputs), unit)
-        known = cross.T @ cho_solve(self._factor, cross)
+        steps = solve_triangular(self._factor, cross, lower=True)
+        known = steps.T @ steps
         return np.asarray(self.scale**2 * (self._covariance(unit, unit) - known))
 
     @cached_property
-    def _factor(self) -> tuple[Array, bool]:
+    def _factor(self) -> Array:
         """Cholesky factor of the covariance of the training values."""
-        return cho_factor(self._noisy_covariance(), lower=True)
+        return np.asarray(cholesky(self._noisy_covariance(), lower=True))
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).

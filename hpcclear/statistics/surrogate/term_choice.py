@@ -19,6 +19,7 @@ from scipy.linalg import solve_triangular
 
 from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
+from hpcclear.base.threads import one_thread
 from hpcclear.statistics.surrogate.metrics import ROUNDING, leave_one_out
 from hpcclear.statistics.surrogate.polynomial import exponents_up_to, monomials, n_terms
 
@@ -38,8 +39,6 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     The constant comes first, then all linear terms, then others up to the total order as they were found; the error is the
     mean square at points that had no part in the choice. Raises InputError: too few points to choose by.
     """
-    from threadpoolctl import threadpool_limits
-
     count, dims = z.shape
     least = least_points(dims)
     if count < least:
@@ -49,7 +48,7 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     linear = exponents_up_to(dims, min(order, 1))
     if order < 2 or np.linalg.matrix_rank(monomials(z, linear)) < len(linear):
         return linear, 0.0  # which the fit refuses if the points do not determine them
-    with threadpool_limits(limits=1, user_api="blas"):  # the same bits on any machine of a kind
+    with one_thread():
         fold = np.arange(count) % FOLDS
         found = [_followed(z, values, order, fold != k)[1] for k in range(FOLDS)]
         steps = min(len(errors) for errors in found)
