@@ -1,10 +1,12 @@
 """Numbers with limits: replicates, what can be told apart, and which designs are simulated until they decide."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from hpcclear.base.student import student
 from hpcclear.scene import load_scene
@@ -18,6 +20,15 @@ from hpcclear.study.optimisation import Choice
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
 CASE = ("C", "m2", "m3", "u2", "I2")
 DESIGN = {"m2": 0.2, "m3": 0.14, "u2": 0.06, "I2": 3e-4}
+
+
+@pytest.mark.parametrize("confidence", [0.0, 0.1, 0.5, 0.95, 0.99, 0.9999, 0.999999])
+def test_quantiles_of_student_are_those_of_scipy(confidence):
+    for freedom in (*range(1, 70), 99, 100, 511, 999, 1000, 1001, 2.5, 1e5):
+        expected = stdtrit(freedom, 0.5 + 0.5 * confidence)
+        assert student(confidence, freedom) == pytest.approx(expected, rel=1e-10, abs=1e-14)
+    assert math.isnan(student(confidence, 0))
+    assert student(1.0, 3) == math.inf
 
 
 def points(scene, count=64, first=0, replicate=0, **more):

@@ -3,6 +3,7 @@
 import errno
 import importlib
 import inspect
+import os
 import random
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 from compile_cache import KINDS, damaged
 from patience import crowded
 
-from hpcclear.base import cached, host, kept
+from hpcclear.base import cached, code_folder, host, kept
 
 
 @pytest.fixture
@@ -149,3 +150,32 @@ def test_commands_with_such_a_cache(part):
         assert most <= (2 if part == "versions" else 1), done.stdout
         assert said == (trials if part == "damage" else 0), done.stdout
         assert "errors" not in line or "(0 errors)" in line
+
+
+def test_a_source_that_was_written_is_noticed_whatever_its_size_and_time(tmp_path):
+    path = tmp_path / "law.py"
+    path.write_text("k = 1.0\n")
+    about, before = path.stat(), code_folder._listing(tmp_path)
+    assert code_folder._listing(tmp_path) == before
+    path.write_text("k = 2.0\n")
+    os.utime(path, ns=(about.st_atime_ns, about.st_mtime_ns))
+    assert code_folder._listing(tmp_path) != before
+
+
+def test_the_key_of_the_sources_is_the_same_read_or_computed(tmp_path):
+    tmp_path.chmod(0o700)
+    code = "from hpcclear.base import code_folder as c; print(c.source_key(), c._place()[0])"
+    found, kept = [], None
+    for line in (None, "another key\n", "damaged", None):
+        if line is not None and kept is not None:
+            kept.write_text(line)
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "HPCCLEAR_CACHE": str(tmp_path)},
+            capture_output=True, text=True, check=True, timeout=crowded(120),
+        )  # fmt: skip
+        key, folder = done.stdout.split()
+        kept = Path(folder) / "sources"
+        assert kept.read_text().split()[1] == key
+        found.append(key)
+    assert set(found) == {code_folder.source_key()}

@@ -294,26 +294,16 @@ def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch
     assert contents(tmp_path / "out") == whole
 
 
-def _draws(one: Failures, failing: float) -> None:
-    """Weighted draws of design 0 of which some fail, each with a weight of 1e-3."""
-    weights = np.zeros(8 * REPEATS)
-    weights[:: round(1.0 / failing)] = 1e-3
-    one.drawn = {0: [WeightedDraws(0, np.zeros((len(weights), 2)), weights)]}
-
-
-@pytest.mark.parametrize("count", [512, 4096])
-@pytest.mark.parametrize("probability", [2e-2, 5e-2])
+@pytest.mark.parametrize(("count", "probability"), [(512, 2e-2), (512, 5e-2), (4096, 2e-2)])
 def test_weighted_draws_that_miss_a_way_to_fail_are_not_believed(count, probability):
     """Of plain simulations more fail than the draws allow for: these decide. Where as many fail as they say, the draws do."""
-    goal = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
+    goal, said = Constraint(statistic="exceedance", limit=1.0, most=1e-3), 5e-4
     one = Failures.__new__(Failures)
     one.goals = [goal]
-    _draws(one, 0.5)  # 5e-4
-    f = np.zeros(count)
-    f[: round(probability * count)] = 2.0
-    plain = excess_of(goal, made := np.random.default_rng(3).permutation(f).reshape(1, 16, -1), {})
-    assert one.excess(0, 0, *plain[:2], made) == plain[:2]
-    f[:] = 0.0
-    f[: round(5e-4 * count)] = 2.0
-    rare_value, _ = one.excess(0, 0, 0.0, 0.0, f.reshape(1, 16, -1))
-    assert rare_value == pytest.approx(tail.of_share(1e-3) - tail.of_share(5e-4))
+    one.drawn = {0: [WeightedDraws(0, np.zeros((REPEATS, 2)), np.full(REPEATS, said))]}
+    ranks = np.random.default_rng(3).permutation(count).reshape(1, 16, -1)
+    missed, fair = (np.where(ranks < round(p * count), 2.0, 0.0) for p in (probability, said))
+    plain = excess_of(goal, missed, {})[:2]
+    assert one.excess(0, 0, *plain, missed) == plain
+    expected = tail.of_share(1e-3) - tail.of_share(said)
+    assert one.excess(0, 0, 0.0, 0.0, fair)[0] == pytest.approx(expected)

@@ -72,7 +72,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Declared:
+class Described:
     """What laws and geometries declare alike."""
 
     words: str
@@ -97,7 +97,7 @@ class Declared:
 
 
 @dataclass(frozen=True, eq=False)
-class Law(Declared):
+class Law(Described):
     """What laws of all kinds declare. Raises TypeError: a function requires an unknown quantity."""
 
     check: Function | None = None
@@ -137,7 +137,7 @@ class Law(Declared):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Geometry(Declared):
+class Geometry(Described):
     """The elastic part of a normal force by the shapes that touch; laws that damp by a `ContactLaw.factor` go with any."""
 
     elastic: Function

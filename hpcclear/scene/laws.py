@@ -12,7 +12,7 @@ from pydantic.json_schema import JsonSchemaValue
 from hpcclear.base.errors import at
 from hpcclear.base.pieces import Rows
 from hpcclear.laws import laws, names
-from hpcclear.laws.declared import ContactLaw, Declared, FrictionLaw, Geometry, Law, Parameter
+from hpcclear.laws.declared import ContactLaw, Described, FrictionLaw, Geometry, Law, Parameter
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.curves import Pairs
 from hpcclear.scene.fields import Converted, Quantity, Table, checked_table, hint, invalid, nearest
@@ -73,7 +73,7 @@ def on_geometry(law: ContactLaw, name: str, rows: Rows | None = None) -> Contact
     return _on(law, shape if rows is None else shape.of_rows(rows))
 
 
-def _with_entries(kind: str) -> Iterator[Declared]:
+def _with_entries(kind: str) -> Iterator[Described]:
     """All of this package that has entries in a law's table: laws, and for contact the geometries."""
     yield from laws(kind).values()
     if kind == "contact":
@@ -275,7 +275,7 @@ def _curve(data: Mapping[str, object]) -> Rows | None:
     return rows
 
 
-def _schema(parameter: Parameter, every: Mapping[str, Declared]) -> JsonSchemaValue:
+def _schema(parameter: Parameter, every: Mapping[str, Described]) -> JsonSchemaValue:
     entry = quantity_of(parameter).json_schema()
     own = parameter.name
     whose = [name for name, one in every.items() if own in [p.name for p in one.parameters]]
