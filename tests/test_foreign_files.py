@@ -83,7 +83,8 @@ def test_one_damaged_file_does_not_hide_the_others(tmp_path, command):
     data.write_study(tmp_path)
     good = len(dataset.files_in(tmp_path))
     for name in ("aa.nc", "zz.nc"):
-        (tmp_path / name).write_bytes(netcdf.encode(Results.of(data.timing())))  # without a seal
+        unsealed = netcdf.encode(Results.of(data.timing()))
+        (tmp_path / name).write_bytes(unsealed.getvalue())
     done = CliRunner().invoke(cli, [command, str(tmp_path)], standalone_mode=False)
     assert done.return_value == 1
     assert done.output.count("aa.nc") == done.output.count("zz.nc") == 1

@@ -247,36 +247,37 @@ def share_of_rough(c: np.ndarray, m3: float) -> float:
 
 
 def test_few_simulations_still_show_a_design_at_the_edge(carried_out, shift):
-    """f is rough, so that weighted draws scatter much: designs that nearly reach the edge stay open, one below is shown.
+    """f is rough, so that weighted draws scatter much: designs that nearly reach the edge stay open, one below is shown, but in
+    one study of six, by 12 seeds.
 
-    Which of them stay open, and their m2, which has no influence, are left to chance.
-    """
+    Which of them stay open, and their m2, which has no influence, are left to chance."""
 
     def rough(column):
         c, m3 = (column[path] for path in ("joints.crank_rod.clearance", "mechanism.slider.mass"))
         return 1e-3 * (m3 + 0.02 * np.sin(1e9 * c) + 0.004 * (c - 5e-4) / 5e-5)
 
-    scene = scene_of(FEW, f"study.seed={3 + shift}")
-    c = scene.required_study.random_input("C").law((np.arange(400_000) + 0.5) / 400_000)
-    found = opened.read(carried_out(scene, objective=rough) / "verification.nc", "verification")
-    codes = found["constraint_verdict"].to_numpy()[:, 0]
-    verdicts = dict(zip(found["design"].to_numpy(), codes, strict=True))
-    mass = {name: float(found["m3"].sel(design=name)) for name in verdicts}
-    share = {name: share_of_rough(c, mass[name]) / 5e-4 for name in verdicts}
-    assert verdicts["heavy alpha"] == Verdict.HOLDS
-    kept = [name for name, one in verdicts.items() if one == Verdict.HOLDS]
-    assert mass["heavy alpha"] == max(mass[name] for name in kept)
-    # what is sought is a known part of the allowed probability, and the model may be wrong by a factor of two
-    at_most(share["heavy alpha"], 1.0)
-    at_least(share["heavy alpha"], 0.2)
-    # lighter ones are left open as they are: they cannot be better
-    open_ = [
-        name
-        for name, one in verdicts.items()
-        if one == Verdict.UNDECIDED and mass[name] > max(map(mass.get, kept))
-    ]
-    # an interval that holds 1 within a factor of two; at the edge by the model, which may be as wrong
-    assert all(0.25 < share[name] < 4.0 for name in open_)
+    seeds, shown = range(3 + shift, 9 + shift), 0
+    for seed in seeds:
+        scene = scene_of(FEW, f"study.seed={seed}")
+        c = scene.required_study.random_input("C").law((np.arange(400_000) + 0.5) / 400_000)
+        file = carried_out(scene, objective=rough) / "verification.nc"
+        found = opened.read(file, "verification").set_index(design="design")
+        mass = dict(zip(found["design"].values, found["m3"].values, strict=True))
+        codes = dict(zip(mass, found["constraint_verdict"].values[:, 0], strict=True))
+        share = {name: share_of_rough(c, one) / 5e-4 for name, one in mass.items()}
+        heaviest = max((mass[k] for k, one in codes.items() if one == Verdict.HOLDS), default=0.0)
+        if codes["heavy alpha"] == Verdict.HOLDS:
+            shown += 1
+            assert mass["heavy alpha"] == heaviest
+            at_most(share["heavy alpha"], 1.0)
+            at_least(
+                share["heavy alpha"], 0.2
+            )  # a known part is sought, by a model that may be wrong by a factor of two
+        # lighter ones are left open as they are: they cannot be better
+        open_ = [k for k, one in codes.items() if one == Verdict.UNDECIDED and mass[k] > heaviest]
+        # an interval that holds 1 within a factor of two; at the edge by the model, which may be as wrong
+        assert all(0.25 < share[name] < 4.0 for name in open_)
+    at_least(shown, fewest(len(seeds), 5 / 6))
 
 
 @pytest.mark.full
