@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+import machines
 import pytest
 from margins import energy_closes
 from pairwise import CONTACTS, FRICTIONS, pairwise_table
 
 from hpcclear import Scene, load_scene, simulate
-from hpcclear.base.outcome import Status
+from hpcclear.base.outcome import Flag, Status
 
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
@@ -66,3 +67,24 @@ def test_every_pair_of_effects_runs(row):
     assert int(response["status"]) == Status.OK
     energy_closes(response, 1e-4)
     assert (response["mean_gap"].to_numpy() > 0.0).all()
+
+
+# -- machines with plain bearings ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(one, marks=[] if one == "engine" else pytest.mark.full)
+        for one in machines.MACHINES
+    ],
+)
+def test_numbers_by_hand_are_those_of_the_simulation(name):
+    scene = machines.scene_of(name)
+    found = simulate(scene)
+    assert int(found["status"]) == Status.OK
+    assert not int(found["flags"]) & Flag.BEYOND_HERTZ
+    checks = list(machines.MACHINES[name].by_hand(scene, found))
+    assert checks
+    for one in checks:
+        assert one.simulated == pytest.approx(one.by_hand, rel=one.within), one.words

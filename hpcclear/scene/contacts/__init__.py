@@ -3,8 +3,8 @@
 A new geometry is a file here, which `KINDS` finds; no other file changes. `declared` has what they share.
 """
 
+from hpcclear.base.discovery import kinds_in
 from hpcclear.scene.contacts.declared import ContactGeometry
-from hpcclear.scene.loads.declared import kinds_in
 
 KINDS: dict[str, type[ContactGeometry]] = kinds_in(__name__, __path__, ContactGeometry)
 """Tables of joints that may have clearance by their kinds."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import Field
 
-from hpcclear.scene.loads.declared import Load, kinds_in
+from hpcclear.base.discovery import kinds_in
+from hpcclear.scene.loads.declared import Load
 
 KINDS: dict[str, type[Load]] = kinds_in(__name__, __path__, Load)
 """Tables of loads by their kinds."""

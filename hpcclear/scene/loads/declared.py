@@ -1,11 +1,9 @@
 """What a load declares: its table in a scene, its numbers, and the terms that it adds to a motion."""
 
 import math
-import pkgutil
 from collections.abc import Iterable
-from importlib import import_module
 from types import NoneType
-from typing import Any, ClassVar, TypeVar, get_args
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import StrictBool
@@ -14,8 +12,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Table, invalid
-
-Kind = TypeVar("Kind", bound=Table)
 
 
 def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
@@ -32,18 +28,6 @@ def numbers_of(table: Table, name: str) -> dict[str, Array | float]:
     entries = {entry: getattr(table, entry, None) for entry in type(table).model_fields}
     others = (str, bool, tuple, Table, NoneType)
     return {f"{name}_{n}": one for n, one in entries.items() if not isinstance(one, others)}
-
-
-def kinds_in(package: str, path: Iterable[str], base: type[Kind]) -> dict[str, type[Kind]]:
-    """Subclasses of a class that modules of a package define and that have a `kind` and a `name`, by their kinds."""
-    found: dict[str, type[Kind]] = {}
-    for module in pkgutil.iter_modules(path):
-        name = f"{package}.{module.name}"
-        for one in vars(import_module(name)).values():
-            own = isinstance(one, type) and issubclass(one, base) and one.__module__ == name
-            if own and {"kind", "name"} <= one.model_fields.keys():
-                found[get_args(one.model_fields["kind"].annotation)[0]] = one
-    return found
 
 
 class JointEffect(Table):

@@ -68,10 +68,8 @@ class Compared:
             best = self.best(objective)
             if self.traded[best, taken].all():
                 taken.append(best)
-        any_less = self.less.any(axis=0)
-        behind = np.asarray(any_less & ~any_less.T)[self.known].any(
-            axis=0
-        )  # by one that is nowhere worse
+        less = self.less.any(axis=0)  # in some objective
+        behind = np.asarray(less & ~less.T)[self.known].any(axis=0)  # one that is nowhere worse
         rows = np.flatnonzero(self.known & ~behind)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)
