@@ -40,7 +40,6 @@ ELSEWHERE = {
 """Files that make such calls about something else."""
 
 KERNEL = (
-    "dynamics/stepping/explicit/stepper.py",
     "dynamics/contacts/bearing.py",
     "dynamics/stepping/sample.py",
 )

@@ -20,7 +20,7 @@ from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.dynamics.stepping.lanes import PrescribedSamples
+from hpcclear.dynamics.stepping.prescribed import PrescribedSamples
 from hpcclear.report.figures import motion, moving
 from hpcclear.scene.points import Points
 

@@ -26,7 +26,7 @@ from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integr
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.sizing import kept_revolutions
 from hpcclear.dynamics.stepping import record as rec
-from hpcclear.dynamics.stepping.lanes import PrescribedSamples
+from hpcclear.dynamics.stepping.prescribed import PrescribedSamples
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program

@@ -18,7 +18,8 @@ from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.setup.parameters import parameters, widest_contact
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
-from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.prescribed import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
