@@ -248,7 +248,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="measure effects with this in their name")
     options = parser.parse_args()
     content = table(options)
-    dataset.netcdf.save(content, options.output)
+    dataset.write(content, options.output)
     style.save(figure(content), options.output.with_suffix(".png"))
     for name in content["effect"].values:
         one = content.sel(effect=name)

@@ -26,7 +26,7 @@ STATIONS = (
     "dynamics/evaluation/evaluator.py:outcome_records",
     "results/checkpoint.py:Checkpoint.add",
     "results/dataset.py:samples_dataset",
-    "results/netcdf.py:save",
+    "results/dataset.py:write",
 )
 """Calls by their files: a clearance becomes a gap, a gap a record, a record a row of a file."""
 

@@ -1,11 +1,10 @@
 """Result files as users open them, as datasets of xarray; read and written by the package, checks included."""
 
 import os
-from pathlib import Path
 
 import xarray as xr
 
-from hpcclear.results import dataset, netcdf
+from hpcclear.results import dataset
 from hpcclear.results.content import Results
 
 
@@ -17,8 +16,3 @@ def read(path: str | os.PathLike[str], *more: str, **asked: str) -> xr.Dataset:
 def write(content: xr.Dataset | Results, path: str | os.PathLike[str]) -> None:
     """Write a file as `dataset.write` does."""
     dataset.write(Results.of(content), path)
-
-
-def save(content: xr.Dataset, path: Path) -> None:
-    """Write a file as `netcdf.save` does, whatever it holds."""
-    netcdf.save(Results.of(content), path)

@@ -130,7 +130,7 @@ def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
 def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
-    opened.save(original, tmp_path / "x.nc")
+    opened.write(original, tmp_path / "x.nc")
     found = netcdf.load(tmp_path / "x.nc").to_xarray()
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
@@ -237,7 +237,7 @@ def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monke
 
 @functools.cache
 def sealed() -> bytes:
-    image = netcdf.encode(Results.of(samples())).getvalue()
+    image = dataset.encode(Results.of(samples())).getvalue()
     return image + netcdf.seal(image)
 
 
@@ -316,7 +316,7 @@ SPOILT = {
 def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
     with xr.set_options(keep_attrs=True):
         spoilt = SPOILT[what](samples())
-    opened.save(spoilt, tmp_path / "x.nc")
+    opened.write(spoilt, tmp_path / "x.nc")
     with pytest.raises(InputError):
         opened.read(tmp_path / "x.nc", "samples")
 

@@ -34,7 +34,7 @@ def forged(path: Path, scene: str) -> Path:
     """A response that says it was made of such a scene."""
     content = data.response(3)
     content.attrs["scene"] = scene
-    opened.save(content, path)
+    opened.write(content, path)
     return path
 
 
@@ -83,7 +83,7 @@ def test_one_damaged_file_does_not_hide_the_others(tmp_path, command):
     data.write_study(tmp_path)
     good = len(dataset.files_in(tmp_path))
     for name in ("aa.nc", "zz.nc"):
-        unsealed = netcdf.encode(Results.of(data.timing()))
+        unsealed = dataset.encode(Results.of(data.timing()))
         (tmp_path / name).write_bytes(unsealed.getvalue())
     done = CliRunner().invoke(cli, [command, str(tmp_path)], standalone_mode=False)
     assert done.return_value == 1
@@ -129,7 +129,7 @@ def evil(tmp_path_factory) -> Path:
         for variable in content.variables.values():
             if isinstance(variable.attrs.get("long_name"), str):
                 variable.attrs["long_name"] += EVIL
-        opened.save(content, path)
+        opened.write(content, path)
     return place
 
 

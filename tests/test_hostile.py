@@ -292,7 +292,7 @@ def forged(path: Path, name: str, value: object) -> None:
         content[name] = (content[name].dims, values, content[name].attrs)
     else:
         content.attrs[name] = value
-    opened.save(content, path)
+    opened.write(content, path)
 
 
 FORGERIES = (

@@ -125,7 +125,7 @@ def planted(path: Path, **attributes: str) -> Path:
     """Samples of another run."""
     content = data.samples(6, 0)
     content.attrs |= {KEY: json.dumps({"command": "sample", "study.seed": "99"}), **attributes}
-    opened.save(content, path)
+    opened.write(content, path)
     return path
 
 

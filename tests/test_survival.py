@@ -117,7 +117,7 @@ NO_MORE_SAVES = [
 AFTER = [
     *NO_MORE_SAVES,
     "once hpcclear.results.checkpoint:Checkpoint.flush 2",
-    "once hpcclear.results.netcdf:write_bytes 3",
+    "once hpcclear.results.dataset:write_bytes 3",
     "call hpcclear.ranks.progress:Progress.add 5",
     "call hpcclear.results.checkpoint:Checkpoint.finish",
     "call hpcclear.ensemble.session:timing_of",

@@ -203,7 +203,7 @@ class Checkpoint:
         """
         variables = {key: _stage_variable(key, values) for key, values in data.items()}
         content = Results(variables, {**self.attributes, "stage": name})
-        netcdf.save(content, self._stage_path(name))
+        dataset.write(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
         """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
@@ -234,7 +234,7 @@ class Checkpoint:
 
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
-        netcdf.save(Results({}, self.attributes), self.directory / _DONE)
+        dataset.write(Results({}, self.attributes), self.directory / _DONE)
         discard(self.directory)
         self._parts.clear()
         self._buffer.clear()

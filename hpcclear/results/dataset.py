@@ -1,16 +1,20 @@
 """Result files: built from plain arrays and records, written whole, and checked when they are read.
 
-The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
-`hpcclear.results.netcdf` and `hpcclear.results.files`.
+The names, dimensions and units come from `hpcclear.results.names`; `hpcclear.results.netcdf` reads the bytes, and
+`hpcclear.results.files` puts them on the disk. A file is built in memory, so the same content gives the same bytes and a full
+disk meets a plain ``write`` instead of the HDF5 library. Written with h5py: a checkpoint every few seconds must cost next to
+nothing, and this takes a fifth of the time of the general writers. Readers see a plain NetCDF-4 file.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,10 +24,15 @@ from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.results import netcdf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.faults import fault_of
+from hpcclear.results.files import write_bytes
 from hpcclear.results.names import DESIGN_VARIABLES, KINDS, LIMIT, ROLE
 from hpcclear.results.rows import FileVariable, ResultKind
 
 CONVENTIONS = "CF-1.11"
+
+_NO_VARIABLE = f"{netcdf.BARE.decode()} but not a netCDF variable. %9d"
+# bytes; HDF5 keeps at most 64 kB in an object header, longer text goes to the heap
+_ATTRIBUTE_LIMIT = 30_000
 
 # -----------------------------------------------------------------------------------------------
 # Building
@@ -211,12 +220,79 @@ def records(samples: Results) -> np.ndarray:
 
 
 def write(content: Results, path: str | os.PathLike[str]) -> None:
-    """Write results as NetCDF-4, whole or not at all; equal content gives equal bytes.
+    """Write results as sealed NetCDF-4, whole or not at all; equal content gives equal bytes.
 
     The file is written under a temporary name in the same directory, synced, and renamed. Raises InputError: the place cannot
     be written to. Raises StorageError: the disk is full or fails; what stood at `path` before still does.
     """
-    netcdf.save(content, _path(path))
+    image = encode(content)
+    with image.getbuffer() as written:
+        ending = netcdf.seal(written)
+    image.seek(0, io.SEEK_END)
+    image.write(ending)  # behind it, in place: of a large file no second copy is made
+    with image.getbuffer() as written:
+        write_bytes(_path(path), written, netcdf.SEAL)
+
+
+def encode(content: Results) -> io.BytesIO:
+    """Results as a NetCDF-4 file, in the memory it was built in; equal content gives equal bytes.
+
+    Variables are numbers or text; coordinates are one-dimensional and named as their dimension. Floating-point data variables
+    carry ``_FillValue = NaN``, coordinates and integers carry none. Raises ValueError: a type or a coordinate that the file
+    cannot hold.
+    """
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", track_order=True) as file:
+        for number, name in enumerate(content.sizes):
+            _encode_dimension(file, name, number, content)
+        for name, variable in content.variables.items():
+            if name not in content.sizes:
+                target = _encode_variable(file, name, variable, filled=True)
+                for axis, dimension in enumerate(variable.dims):
+                    target.dims[axis].attach_scale(file[dimension])
+        _encode_attributes(file, content.attrs)
+    return buffer
+
+
+def _encode_dimension(file: h5py.File, name: str, number: int, content: Results) -> None:
+    if name in content:
+        scale = _encode_variable(file, name, content[name], filled=False)
+        scale.make_scale(name)
+    else:
+        size = content.sizes[name]
+        scale = file.create_dataset(name, shape=(size,), dtype=">f4", track_order=True)
+        scale.make_scale(_NO_VARIABLE % size)
+    scale.attrs["_Netcdf4Dimid"] = np.int32(number)
+
+
+def _encode_variable(file: h5py.File, name: str, variable: Variable, filled: bool) -> h5py.Dataset:
+    values = variable.values
+    dtype = values.dtype.newbyteorder("<")
+    fill = None
+    if dtype.kind == "U":
+        dtype, values = h5py.string_dtype(), values.astype(object)
+    elif dtype.str not in netcdf.DTYPES:
+        raise ValueError(f"{name!r} has type {dtype}, which a dataset cannot hold")
+    elif dtype.kind == "f" and filled:
+        fill = dtype.type(np.nan)
+    target = file.create_dataset(name, data=values, dtype=dtype, fillvalue=fill, track_order=True)
+    if fill is not None:
+        target.attrs["_FillValue"] = np.array([fill], dtype)
+    _encode_attributes(target, variable.attrs)
+    return target
+
+
+def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str, object]) -> None:
+    for name, value in attributes.items():
+        if isinstance(value, str):
+            data = value.encode()
+            if 0 < len(data) < _ATTRIBUTE_LIMIT:  # NetCDF char, which every tool reads
+                kind = h5py.string_dtype("ascii" if data.isascii() else "utf-8", len(data))
+                target.attrs.create(str(name), np.array(data, kind), dtype=kind)
+            else:
+                target.attrs[str(name)] = value
+        else:
+            target.attrs[str(name)] = np.atleast_1d(np.asarray(value))
 
 
 FilePath = str | os.PathLike[str]
