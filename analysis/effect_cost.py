@@ -26,7 +26,7 @@ from hpcclear.report.figures import style
 from hpcclear.results import dataset
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 
 JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 

@@ -21,8 +21,8 @@ from regret import STUDIES, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
+from hpcclear.scene.streams import unit_lhs
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import tolerance, truth
 from hpcclear.study.optimisation import Choice

@@ -15,7 +15,7 @@ import numpy as np
 from directly import run_of
 
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import student
 from hpcclear.study import truth

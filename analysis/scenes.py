@@ -13,8 +13,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import Points, latin_hypercube
 
 ROOT = Path(__file__).parent.parent
 JOB = ROOT / "jobs" / "quickstart.toml"

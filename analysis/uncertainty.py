@@ -15,7 +15,7 @@ import numpy as np
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS
 from hpcclear.scene import load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 
 JOB = Path(__file__).parents[1] / "jobs" / "robust_slider_crank.toml"
 LAWS = {

@@ -21,7 +21,7 @@ from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.provenance import program
 from hpcclear.scene import load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 
 JOBS = Path(__file__).parent.parent / "jobs"
 STIFF = {

@@ -19,8 +19,8 @@ ROOT = Path(__file__).parent.parent / "hpcclear"
 STATIONS = (
     "base/units.py:to_si",
     "scene/contacts/pin_in_bearing.py:PinInBearing._check",
-    "scene/sampling.py:latin_hypercube",
-    "scene/sampling.py:check_points",
+    "scene/points.py:latin_hypercube",
+    "scene/points.py:check_points",
     "dynamics/setup/parameters.py:fill",
     "dynamics/stepping/lanes.py:Lanes.step",
     "dynamics/evaluation/evaluator.py:outcome_records",

@@ -22,7 +22,7 @@ from hpcclear.dynamics.stepping.implicit.columns import new_columns
 from hpcclear.dynamics.stepping.implicit.inverses import invert_complex, invert_real
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 
 JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 FILM = "film={model='short', viscosity='10 mPa*s', length='20 mm'}"

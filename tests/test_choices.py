@@ -11,8 +11,8 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.cases import Goal
 from hpcclear.scene.domain import box
 from hpcclear.scene.fits import fit_of
-from hpcclear.scene.points import Points, expanded, nearest_of, snapped
-from hpcclear.scene.sampling import latin_hypercube, monte_carlo
+from hpcclear.scene.points import Points, expanded, latin_hypercube, nearest_of, snapped
+from hpcclear.scene.sampling import monte_carlo
 
 JOB = tomllib.loads(
     (Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml").read_text()

@@ -10,9 +10,10 @@ from scipy import stats
 from scipy.special import gamma
 
 from hpcclear.base.errors import InputError
+from hpcclear.ensemble.samples import design
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.scene.sampling import monte_carlo, sampled
+from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.surrogate.kernels import MATERN, SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -122,7 +123,7 @@ def test_sobol_and_latin_hypercube_have_them_with_few_points(name: str) -> None:
         monte_carlo(scene, 1024, random=("C", "m2"), design=DESIGN, replicate=k).column("C")
         for k in range(4)
     ]
-    strata = sampled(scene.with_({"study.method": "random-lhs", "study.samples": 4096}))
+    strata = design(scene.with_({"study.method": "random-lhs", "study.samples": 4096}), None)
     for drawn in (np.concatenate(sobol), strata.column("C")):
         assert abs(drawn.mean() - mean) < 2e-3 * deviation  # independent ones: 16e-3
         assert abs(drawn.std() - deviation) < 6e-3 * deviation
@@ -250,7 +251,7 @@ def test_every_method_correlates(method: str) -> None:
     scene = ROBUST.with_(
         {"study.correlation": MOULD, "study.method": method, "study.samples": 4096}
     )
-    points = sampled(scene)
+    points = design(scene, None)
     assert _correlation(points.column("m2"), points.column("m3")) == pytest.approx(0.786, abs=0.03)
     assert abs(_correlation(points.column("m2"), points.column("u2"))) < 0.06
 

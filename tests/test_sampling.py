@@ -11,8 +11,8 @@ from scipy import stats
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.scene.points import read_points
-from hpcclear.scene.sampling import latin_hypercube, monte_carlo
+from hpcclear.scene.points import latin_hypercube, read_points
+from hpcclear.scene.sampling import monte_carlo
 
 JOBS = Path(__file__).parent.parent / "jobs"
 ROBUST = load_scene(JOBS / "robust_slider_crank.toml")

@@ -13,7 +13,7 @@ from patience import crowded
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.metrics import accuracy

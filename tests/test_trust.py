@@ -9,7 +9,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS
 from hpcclear.ensemble.api import as_points
 from hpcclear.scene import load_scene
-from hpcclear.scene.sampling import latin_hypercube
+from hpcclear.scene.points import latin_hypercube
 
 SCENE = "jobs/quickstart.toml"
 

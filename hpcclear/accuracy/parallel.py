@@ -13,7 +13,7 @@ from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import points_at
+from hpcclear.scene.points import points_at
 from hpcclear.scene.scene import record_of
 from hpcclear.scene.streams import generator
 

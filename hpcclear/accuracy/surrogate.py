@@ -11,9 +11,8 @@ from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import points_at, unit_lhs
-from hpcclear.scene.streams import generator
+from hpcclear.scene.points import Points, points_at
+from hpcclear.scene.streams import generator, unit_lhs
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import Leaf

@@ -9,8 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import moves_geometry, poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box
-from hpcclear.scene.points import Points, check_points, expanded, snapped
-from hpcclear.scene.sampling import points_at
+from hpcclear.scene.points import Points, check_points, expanded, points_at, snapped
 from hpcclear.scene.streams import generator
 
 MOST = 64

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -26,8 +27,8 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points, expanded, read_points
-from hpcclear.scene.sampling import sampled
+from hpcclear.scene.points import Points, expanded, latin_hypercube, read_points
+from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.scene import record_of
 
 MEMORY = 2.3e-6
@@ -47,7 +48,12 @@ def design(scene: Scene, table: Path | None) -> Points:
     if scene.study is None:
         remedy = "Add a [study] table, or give --points designs.csv"
         raise InputError("study", None, "the scene has no [study] table", remedy)
-    return sampled(scene)
+    if (method := scene.study.method) == "lhs":
+        points = latin_hypercube(scene)
+    else:
+        sequence = 0 if method == "qmc" else None
+        points = monte_carlo(scene, replicate=sequence, stratified=method == "random-lhs")
+    return replace(points, sampling=method)
 
 
 def run_sample(

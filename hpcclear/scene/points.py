@@ -1,4 +1,4 @@
-"""Designs to simulate: arrays with a name and scene entries for each column, their check, and users' tables of them."""
+"""Designs to simulate: arrays with a name and scene entries for each column; drawn or read from a table, and checked."""
 
 import itertools
 import re
@@ -13,11 +13,14 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
+from hpcclear.base.quantiles import Empirical
+from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.slider_crank import SliderCrank
+from hpcclear.scene.streams import generator, unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 
@@ -202,6 +205,47 @@ def _refuse(bad: Booleans, values: Array, name: str, reason: str, label: Label) 
         row = int(np.argmax(bad))
         key = f"{label(row)}, {name}"
         raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
+
+
+def latin_hypercube(
+    scene: Scene,
+    samples: int | None = None,
+    *,
+    names: Sequence[str] | None = None,
+    purpose: str = "train",
+) -> Points:
+    """The study's Latin hypercube over its variables, SI; a variable given as a ratio comes as the inertia it stands for.
+
+    `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. Designs for
+    different purposes are independent; the same purpose gives the same points. Raises InputError if the scene has no study, a
+    name is unknown, or a point makes no mechanism.
+    """
+    study = scene.required_study
+    count = count_of(study, samples)
+    region = box(scene, names)
+    unit = unit_lhs(count, len(region.names), generator(study.seed, f"lhs {purpose}"))
+    coordinates = region.at(unit)
+    for column, name in enumerate(region.names):
+        if (options := study.variable(name).options) is not None:
+            coordinates[:, column] = Empirical(options)(unit[:, column])
+    points = points_at(scene, region.names, coordinates)
+    check_points(scene, points)
+    return points
+
+
+def points_at(scene: Scene, names: tuple[str, ...], coordinates: Array) -> Points:
+    """Designs at sampling coordinates (n, d) of variables of the scene's study; they may make no mechanism."""
+    paths = tuple(scene.required_study.variable(name).paths for name in names)
+    return Points(names, to_physical(scene, names, coordinates), paths)
+
+
+def count_of(study: Study, samples: int | None, first: int = 0) -> int:
+    """How many samples to draw, by default those of the study; raises InputError if there are none, or `first` is negative."""
+    count = study.samples if samples is None else samples
+    if count < 1 or first < 0:
+        reason = "at least one sample, from index 0 on, is needed"
+        raise InputError("samples", count, reason, "Request 1 or more")
+    return count
 
 
 LABELS = (

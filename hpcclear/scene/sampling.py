@@ -1,11 +1,10 @@
-"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences.
+"""Random inputs drawn: Monte Carlo samples, scrambled Sobol sequences.
 
 Every number follows from the study's seed, a purpose ("train", "test", ...) and, for Monte Carlo,
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,54 +12,13 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Empirical
-from hpcclear.scene.domain import box, slender_inertias, to_physical
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.domain import slender_inertias
+from hpcclear.scene.points import Points, check_points, count_of
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.streams import generator, sobol, uniform
+from hpcclear.scene.streams import unit_lhs as unit_lhs
 from hpcclear.scene.study import Study
-
-
-def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
-    """A Latin hypercube in the unit cube (samples, dimensions): each of `samples` equal strata of each axis holds one point.
-
-    Source: McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
-    """
-    from scipy.stats import qmc  # most of a second to import; a single response needs none of it
-
-    return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
-
-
-def latin_hypercube(
-    scene: Scene,
-    samples: int | None = None,
-    *,
-    names: Sequence[str] | None = None,
-    purpose: str = "train",
-) -> Points:
-    """The study's Latin hypercube over its variables, SI; a variable given as a ratio comes as the inertia it stands for.
-
-    `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. Designs for
-    different purposes are independent; the same purpose gives the same points. Raises InputError if the scene has no study, a
-    name is unknown, or a point makes no mechanism.
-    """
-    study = scene.required_study
-    count = _count(study, samples)
-    region = box(scene, names)
-    unit = unit_lhs(count, len(region.names), generator(study.seed, f"lhs {purpose}"))
-    coordinates = region.at(unit)
-    for column, name in enumerate(region.names):
-        if (options := study.variable(name).options) is not None:
-            coordinates[:, column] = Empirical(options)(unit[:, column])
-    points = points_at(scene, region.names, coordinates)
-    check_points(scene, points)
-    return points
-
-
-def points_at(scene: Scene, names: tuple[str, ...], coordinates: Array) -> Points:
-    """Designs at sampling coordinates (n, d) of variables of the scene's study; they may make no mechanism."""
-    paths = tuple(scene.required_study.variable(name).paths for name in names)
-    return Points(names, to_physical(scene, names, coordinates), paths)
 
 
 def _chances(
@@ -109,10 +67,10 @@ def monte_carlo(
     With a `replicate`, samples of the randomised Sobol sequence of this number replace independent ones; each sequence is one
     independent estimate: begin and end at powers of two. Of several, as many samples of each, one sequence after the other.
     `stratified`: a Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together
-    the first alone keeps its strata. Raises InputError as `latin_hypercube`.
+    the first alone keeps its strata. Raises InputError as `hpcclear.scene.points.latin_hypercube`.
     """
     study = scene.required_study
-    count = _count(study, samples, first)
+    count = count_of(study, samples, first)
     inputs = {row.name: row for row in study.random}
     chosen = _known("random", inputs if random is None else random, inputs)
     named = _known("design", design or (), study.names)
@@ -149,14 +107,6 @@ def monte_carlo(
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row % each}")
     return points
-
-
-def _count(study: Study, samples: int | None, first: int = 0) -> int:
-    count = study.samples if samples is None else samples
-    if count < 1 or first < 0:
-        reason = "at least one sample, from index 0 on, is needed"
-        raise InputError("samples", count, reason, "Request 1 or more")
-    return count
 
 
 def _free(study: Study, name: str, place: Array) -> Array:
@@ -201,17 +151,6 @@ def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str
         if name not in known:
             raise InputError(what, name, "is not one of the study's", f"Use {', '.join(known)}")
     return chosen
-
-
-def sampled(scene: Scene) -> Points:
-    """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
-    method = scene.required_study.method
-    if method == "lhs":
-        points = latin_hypercube(scene)
-    else:
-        sequence = 0 if method == "qmc" else None
-        points = monte_carlo(scene, replicate=sequence, stratified=method == "random-lhs")
-    return replace(points, sampling=method)
 
 
 _PAGE = 4096  # points made at a time

@@ -42,3 +42,13 @@ def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> 
     if first:
         sequence.fast_forward(first)
     return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `uniform`, off 0
+
+
+def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
+    """A Latin hypercube in the unit cube (samples, dimensions): each of `samples` equal strata of each axis holds one point.
+
+    Source: McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
+    """
+    from scipy.stats import qmc  # most of a second to import; a single response needs none of it
+
+    return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
