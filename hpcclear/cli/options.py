@@ -103,22 +103,20 @@ PROGRESS = option("--progress", "Display of progress.", "auto", type=_STYLES)
 
 
 class Written(NamedTuple):
-    """A scene as the words of a command have it: what `hpcclear.scene.load_scene` takes."""
+    """A scene as the words of a command have it: what `hpcclear.scene.load_scene` takes.
+
+    Load it before anything that simulates: a scene that is refused is refused within a second.
+    """
 
     file: Path
     overrides: tuple[str, ...]
 
 
-def read_scene(written: Written) -> "Scene":
-    """The scene; Python files that it runs, readings of units and likely slips of units are printed.
-
-    Call it before anything that simulates is loaded: a scene that is refused is refused within a second.
-    """
-    from hpcclear.scene import load_scene
+def noted(scene: "Scene") -> "Scene":
+    """The scene; Python files that it runs, readings of units and likely slips of units are printed."""
     from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
 
-    scene = load_scene(*written)
     for text in (*files_run(scene.plugins), *map(str, scene.readings)):
         say(f"Note: {text}")
     for text in implausible(scene):
