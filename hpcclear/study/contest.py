@@ -139,10 +139,8 @@ def _accurate(
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
     reach = reaches(settings, values[0])
-    first = {
-        "mean": reach[0] <= wanted.mean * abs(mean),
-        "deviation": reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean)),
-    }
+    first = {"mean": reach[0] <= wanted.mean * abs(mean)}
+    first["deviation"] = reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
     weights = np.ones(len(case.goals)) if direction is None else direction
     values_of = zip((*case.goals, *case.kept), goals_of(run, choice, values), strict=True)
     for k, (goal, one) in enumerate(values_of):

@@ -9,6 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -82,9 +83,8 @@ class _Rehearsal(Simulations):
         self._like["status"] = Status.OK
         method = surrogates.method_of(run.scene)
         labels = [surrogates.coordinate(run.study.variable(name)) for name in names]
-        self._models = [
-            method.fit(places, one, region.bounds, rng=rng, names=labels) for one in responses
-        ]
+        fit = partial(method.fit, bounds=region.bounds, rng=rng, names=labels)
+        self._models = [fit(places, one) for one in responses]
         self._sizes = self._unexplained(run, designs)
         self._waves = rng.standard_normal((len(names), WAVES)) / SHORT
         self._phases = rng.uniform(0.0, 2.0 * np.pi, WAVES)

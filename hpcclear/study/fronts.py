@@ -22,9 +22,7 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
     solutions = max(fronts[f"front_{k}"].shape[1] for k in range(len(cases)))
     shape = (len(cases), run.study.swarm.runs, solutions)
     used = [n for n in names if any(n in run.study.design_variables(case) for case in cases)]
-    data: dict[str, np.ndarray] = {
-        name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)
-    }
+    data: Result = {name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)}
     data["verified"] = np.zeros(shape, np.int8)
     plain = np.array([case.plain for case in run.study.cases])
     area = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])

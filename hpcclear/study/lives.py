@@ -139,10 +139,8 @@ def _values(scene: Scene, row: RandomInput, clearance: Array, endings: Array) ->
     lower, upper = scene.required_study.variable(row.name).bounds
     if found.min() < lower or found.max() > upper:
         have = f"service lives have clearances from {found.min():.6g} to {found.max():.6g} m"
-        reason, key = (
-            f"{have} after {row.cycles:g} revolutions",
-            f"study.variables.{row.name}.range",
-        )
+        reason = f"{have} after {row.cycles:g} revolutions"
+        key = f"study.variables.{row.name}.range"
         raise InputError(key, (lower, upper), reason, "Widen it to contain them")
     if len(found) > MOST:  # evenly by rank
         found = np.sort(found)[np.linspace(0, len(found) - 1, MOST).round().astype(int)]

@@ -158,10 +158,8 @@ def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
             winner = int(own[:, column].argmin())
             middle, end = choices(run, case.name, np.stack([average, own[winner, :-count]]))
             place = winner, int(best[winner])
-            chosen += [
-                replace(middle, name=f"{case.name} averaged {letter}"),
-                replace(end, name=f"{case.name} best {letter}", place=place),
-            ]
+            chosen.append(replace(middle, name=f"{case.name} averaged {letter}"))
+            chosen.append(replace(end, name=f"{case.name} best {letter}", place=place))
     return chosen
 
 

@@ -145,10 +145,8 @@ class _Averages:
             return lambda designs: fixed
 
         def of_designs(designs: Array) -> dict[str, Array]:
-            rows = [
-                offsets(self.scene, random, list(chances), dict(zip(self.names, one, strict=True)))
-                for one in designs
-            ]
+            named = (dict(zip(self.names, one, strict=True)) for one in designs)
+            rows = [offsets(self.scene, random, list(chances), one) for one in named]
             return {name: np.array([row[name] for row in rows]) for name in random}
 
         return of_designs
@@ -195,9 +193,8 @@ def _ratio(scene: Scene, inertia: str) -> DerivedInput:
     numbers = {part: scene.number(f"{link}.{part}") for part in ("mass", "length")}
 
     def function(*values: Array) -> Array:
-        mass, length = (
-            values[places[part]] if part in places else numbers[part] for part in ("mass", "length")
-        )
+        given = {part: values[place] for part, place in places.items()}
+        mass, length = (numbers | given).values()
         return np.asarray(values[0] / (mass * length**2 / 12))
 
     return DerivedInput(coordinate(study.variable(variable[inertia])), tuple(of), function)

@@ -72,10 +72,8 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     revolutions = settings.response_revolutions * settings.response_windows
     windows, copies = settings.response_windows, settings.response_copies
     variants = [_changes(run, choice, revolutions) for _, choice in chosen]
-    shape, work = (
-        (windows, len(STATISTICS), _quantities(run.scene)),
-        partial(_statistics, windows=windows),
-    )
+    shape = windows, len(STATISTICS), _quantities(run.scene)
+    work = partial(_statistics, windows=windows)
     what = run.scene, variants, work, shape, run.ranks, "responses: simulations"
     table = responses_of(*what, copies=copies, together=TOGETHER)
     return {"names": np.array([name for name, _ in chosen]), "statistics": table}
@@ -91,10 +89,8 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             response = simulated(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
-            why = (
-                f"its simulation ended as {status.name.lower()}: {status.message}. {status.remedy}"
-            )
-            run.notify(f"The response of {name} has no file: {why}")
+            why = f"ended as {status.name.lower()}: {status.message}. {status.remedy}"
+            run.notify(f"The response of {name} has no file: its simulation {why}")
             continue
         content = _steady(scene, response)
         made_by = {**scene.origin, "scene": scene.to_toml(), **program()}

@@ -48,9 +48,8 @@ class StudyRun:
     def words(self) -> dict[str, str]:
         """What the study variables are, by their names, and the ratios of inertias among them."""
         variables = self.study.variables
-        return {one.name: one.words for one in variables} | {
-            f"{one.name}_ratio": one.ratio_words for one in variables if one.ratio is not None
-        }
+        ratios = {f"{x.name}_ratio": x.ratio_words for x in variables if x.ratio is not None}
+        return {one.name: one.words for one in variables} | ratios
 
     def of(self, scene: Scene) -> "StudyRun":
         """The same run of a scene whose settings are other ones; what follows is numbered on."""

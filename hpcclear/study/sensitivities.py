@@ -68,10 +68,8 @@ def analyse(run: StudyRun) -> Result:
     sensitivity.nc, its coordinates but for names, and ``failed``."""
     designs = _designs(run)
     inputs = surfaces(run.study)
-    batches = [
-        run.simulations.designs((*names, parameter(run)), design.points).values
-        for names, design in zip(inputs, designs, strict=True)
-    ]
+    each = zip(inputs, (design.points for design in designs), strict=True)
+    batches = [_filled(run, names, points) for names, points in each]
     sobol = _sobol_points(run)
     if len(sobol):
         batches.append(run.simulations.designs(run.study.names, sobol).values)
@@ -82,6 +80,11 @@ def analyse(run: StudyRun) -> Result:
     result |= _global(run, parts[-1] if len(sobol) else None)
     result["failed"] = np.asarray(sum(np.count_nonzero(np.isnan(part)) for part in parts))
     return result
+
+
+def _filled(run: StudyRun, names: Sequence[str], points: Array) -> Array:
+    """Designs in all study variables, from coordinates in these and, last, the variable that is held fixed."""
+    return run.simulations.designs((*names, parameter(run)), points).values
 
 
 def _simulated(run: StudyRun, batches: Sequence[Array]) -> list[Array]:
@@ -270,7 +273,7 @@ def _searched(
             k, level = places[number]
             inputs, design, _ = sampled[k]
             where = np.column_stack([at, np.full(len(at), design.clearances[level])])
-            batches.append(run.simulations.designs((*inputs, parameter(run)), where).values)
+            batches.append(_filled(run, inputs, where))
         return dict(zip(asked, _simulated(run, batches), strict=True))
 
     surface_search.fit_until_accepted(evaluate, searches)

@@ -3,7 +3,6 @@
 Resuming, announcements, plans and the files of a finished study all go by this one list.
 """
 
-import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,6 +37,7 @@ from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper import claims, readings
 from hpcclear.study.paper.printed import is_the_papers, printed_designs, printed_moments
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.verification import Verified
 
 
 @dataclass(frozen=True)
@@ -74,20 +74,6 @@ class SearchOutcome(NamedTuple):
 
     designs: list[Choice]
     remarks: list[str]
-
-
-class Verified(NamedTuple):
-    """All designs that were simulated, those that are named among them, their moments, and remarks."""
-
-    designs: list[Choice]
-    table: verification.NamedDesigns
-    true: Result
-    remarks: list[str]
-
-    @property
-    def deciding(self) -> list[Choice]:
-        """The named designs that a decision is between."""
-        return list(itertools.compress(self.table.choices, self.table.deciding))
 
 
 def _sensitivity(run: StudyRun) -> Result:
@@ -131,7 +117,7 @@ def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verifi
     remarks = [*found.remarks, *([text] if run.study.paired else []), *more]
     remarks += verification.undecided(run, table.choices, true)
     remarks += verification.missed(run, table.choices, true, models.searched)
-    return Verified(found.designs, table, true, remarks)
+    return Verified(table, true, remarks)
 
 
 def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
@@ -140,14 +126,8 @@ def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
 
 
 def _verified(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
-    table = verified.table
-    found = (
-        verified.true,
-        models.searched,
-        verified.remarks,
-        printed_moments(run.scene, table.choices),
-    )
-    verification.write(run, table, *found, over_life or {})
+    printed = printed_moments(run.scene, verified.table.choices)
+    verification.write(run, verified, models.searched, printed, over_life or {})
 
 
 def _worst(run: StudyRun, verified: Verified) -> None:
@@ -176,15 +156,16 @@ def _designs(scene: Scene) -> int:
     return found + len(study.cases) + len(printed_designs(scene))  # the original, in each case
 
 
+_BEFORE_VERIFICATION = ("wear", "sensitivity", "surrogates", "search")
+
+
 def _of_verification(scene: Scene) -> dict[str, int]:
     study = scene.required_study
     failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
     each = truth.expected(study) + failing // len(study.cases)
     designs = _designs(scene)
-    before = (
-        stage for stage in STAGES if stage.name in ("wear", "sensitivity", "surrogates", "search")
-    )
-    others = designs * each + sum(sum(stage.samples(scene).values()) for stage in before)
+    before = [stage.samples(scene) for stage in STAGES if stage.name in _BEFORE_VERIFICATION]
+    others = designs * each + sum(sum(parts.values()) for parts in before)
     pairs = tolerance.simulations(study, designs, others)
     return {"verification": designs * each, "pairs": pairs}
 

@@ -367,6 +367,5 @@ def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tu
 
 
 def _percents(values: Array) -> str:
-    return (
-        f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the standard deviation"
-    )
+    mean, deviation = (f"{100 * one:.2g} %" for one in values)
+    return f"{mean} of the mean and {deviation} of the standard deviation"

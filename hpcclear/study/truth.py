@@ -34,10 +34,8 @@ def scattered(
     Every design of a case meets the same scatter in a stage, so that differences between designs are not noise; pairs meet
     that of the verification.
     """
-    random, purpose = (
-        run.study.case(choice.case).random,
-        "verification" if stage == "pairs" else stage,
-    )
+    random = run.study.case(choice.case).random
+    purpose = "verification" if stage == "pairs" else stage
     points = monte_carlo(
         run.scene, count, random=random, design=dict(choice.design), purpose=purpose,
         first=first or 0, replicate=None if first is None else range(REPLICATES),

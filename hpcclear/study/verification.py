@@ -1,8 +1,9 @@
 """Verified designs: which of them is alpha, beta and the front, and where the surrogate missed the truth."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -116,6 +117,20 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> NamedDesign
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
         _name_case(run, case, rows, choices, true, table)
     return table
+
+
+class Verified(NamedTuple):
+    """Verified designs: under their names, what is known of them, and what a reader should know, a sentence each."""
+
+    table: NamedDesigns
+    true: Result
+    """Arrays (n, ...) of `hpcclear.study.tolerance.verified`, over the named designs."""
+    remarks: list[str]
+
+    @property
+    def deciding(self) -> list[Choice]:
+        """The named designs that a decision is between."""
+        return list(itertools.compress(self.table.choices, self.table.deciding))
 
 
 def _name_case(
@@ -254,21 +269,14 @@ def short_of_accuracy(run: StudyRun, table: NamedDesigns, true: Result) -> list[
 
 
 def write(
-    run: StudyRun,
-    table: NamedDesigns,
-    true: Result,
-    model: Piecewise,
-    remarks: Sequence[str],
-    printed: Mapping[str, Array],
-    over_life: Mapping[str, Array],
+    run: StudyRun, verified: Verified, model: Piecewise, printed: Result, over_life: Result
 ) -> None:
     """Write verification.nc.
 
-    `true`: arrays (n, ...) of `hpcclear.study.tolerance.verified`, over the same designs; `model`: the surrogate that was
-    searched; `remarks`: what a reader should know, a sentence each; `printed`: ``mean`` and ``deviation`` (n,) of the same
-    designs in a publication, to stand beside ours; `over_life`: (n,) of `hpcclear.study.lives.of_designs`, empty where
-    nothing wears.
+    `model`: the surrogate that was searched; `printed`: ``mean`` and ``deviation`` (n,) of the same designs in a publication,
+    to stand beside ours; `over_life`: (n,) of `hpcclear.study.lives.of_designs`, empty where nothing wears.
     """
+    table, true, remarks = verified
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)
     used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]

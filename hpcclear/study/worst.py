@@ -87,10 +87,8 @@ def _of_case(
     for k, row in enumerate(rows):
         result["worst_corner"][row] = _largest(f[k][: len(corners)])
     for step in STEPS:
-        fresh = [
-            _about(one[_order(values)[:CENTRES]], step, rng)
-            for one, values in zip(met, f, strict=True)
-        ]
+        best = [one[_order(its)[:CENTRES]] for one, its in zip(met, f, strict=True)]
+        fresh = [_about(one, step, rng) for one in best]
         values = _simulated(run, choices, fresh)
         met = [np.vstack(pair) for pair in zip(met, fresh, strict=True)]
         f = [np.append(before, now) for before, now in zip(f, values, strict=True)]

@@ -98,10 +98,8 @@ def write(run: StudyRun, result: Result) -> None:
     """Write readings.nc; `distance` says how far a reading is from the printed means."""
     designs = printed_designs(run.scene)
     printed = printed_moments(run.scene, designs)
-    coords = {
-        "reading": np.array([reading.text for reading in readings(run.scene)]),
-        "design": np.array([choice.name for choice in designs]),
-    }
+    coords = {"reading": np.array([reading.text for reading in readings(run.scene)])}
+    coords["design"] = np.array([choice.name for choice in designs])
     data = {**result, "mean_paper": printed["mean"], "deviation_paper": printed["deviation"]}
     data["case"] = np.array([choice.case for choice in designs])
     data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed["mean"]) ** 2, axis=1))
