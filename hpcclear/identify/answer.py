@@ -69,10 +69,8 @@ def _identified(
     every = tuple(dict.fromkeys((*settings.names, *usual)))
     units = {name: signal(response, name, "--signal").unit for name in every}
     turns = turns_of(plain.linkage)
-    tables = [
-        [read_measured(path, name, units[name], frequency, turns, sense) for name in settings.names]
-        for path in settings.signals
-    ]
+    how, names = (frequency, turns, sense), settings.names
+    tables = [[read_measured(path, n, units[n], *how) for n in names] for path in settings.signals]
     layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
     size, ranks, sensor = settings.size(), session.ranks, settings.sensor
     kept, style = session.opened(), session.options.style

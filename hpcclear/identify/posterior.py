@@ -93,9 +93,8 @@ class Model:
         scatter, covariance = _scatter(places[:, :unknowns], missed)
         inverse, groups = np.asarray(np.linalg.inv(covariance), float), _groups(len(places))
         kept = [np.ones(len(places), bool), *(groups != k for k in range(FOLDS))]
-        likelihoods = tuple(
-            Likelihood(tuple(_without(m, rows) for m in models), scatter, inverse) for rows in kept
-        )
+        fewer = (tuple(_without(one, rows) for one in models) for rows in kept)
+        likelihoods = tuple(Likelihood(own, scatter, inverse) for own in fewer)
         distances = tuple(_inverse(rest[rows]) for rows in kept)
         return cls(places, summaries, rest, likelihoods, distances)
 

@@ -57,9 +57,7 @@ def constraints_of(one: Results) -> list[JudgedConstraint]:
     for own in each(one, "constraint") if "constraint_verdict" in one else ():
         if (code := int(own["constraint_verdict"])) != ABSENT:
             names = ("true", "lower", "upper", "most", "price")
-            true, lower, upper, most, price = (
-                number_in(own, f"constraint_{name}") for name in names
-            )
+            true, lower, upper, most, price = (number_in(own, f"constraint_{n}") for n in names)
             words = text_in(own, "constraint_goal"), text_in(own, "constraint_unit")
             found.append(JudgedConstraint(*words, true, lower, upper, most, Verdict(code), price))
     return found

@@ -112,10 +112,8 @@ def _growth(content: Results) -> Iterator[Line]:
         text = f"{middle} per day (95 % interval {low} to {high}){of}"
         yield Line(f"growth, {named(name)}", text)
         if "limit" in content.attrs:
-            days = [
-                f"{rounded(float(one) / DAY, '1')} days" if np.isfinite(one) else "never"
-                for one in content["time_to_limit"][:, u]
-            ]
+            times = content["time_to_limit"].values[:, u] / DAY
+            days = [f"{rounded(t, '1')} days" if np.isfinite(t) else "never" for t in times]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
             yield Line(f"time to {limit}, {named(name)}", text)

@@ -6,6 +6,7 @@ Each kind of result makes its own, in a module of `hpcclear.report.screens`; nob
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,20 +33,9 @@ class Trust(NamedTuple):
     place: str = ""
     """Subject of the page on which more is said."""
 
-    @classmethod
-    def red(cls, text: str, place: str = "") -> "Trust":
-        """A line of this level."""
-        return cls(Level.RED, text, place)
 
-    @classmethod
-    def amber(cls, text: str, place: str = "") -> "Trust":
-        """A line of this level."""
-        return cls(Level.AMBER, text, place)
-
-    @classmethod
-    def green(cls, text: str, place: str = "") -> "Trust":
-        """A line of this level."""
-        return cls(Level.GREEN, text, place)
+red, amber, green = (partial(Trust, level) for level in Level)
+"""Make lines of each level, of a text and, where there is one, a subject."""
 
 
 class Tile(NamedTuple):
@@ -135,10 +125,8 @@ class Screen:
             return [[("", *self.header[1:], "95 %, note", "change"), *tiles, *rows]]
         numbers = [(one.label, one.value, one.within) for one in self.tiles]
         rows = [(row.label, *row.cells) for row in self.rows]
-        own: list[list[Sequence[str]]] = [
-            [("quantity", "value", "95 %, note"), *numbers],
-            [self.header, *rows],
-        ]
+        head = ("quantity", "value", "95 %, note")
+        own: list[list[Sequence[str]]] = [[head, *numbers], [self.header, *rows]]
         return [table for table in own if len(table) > 1]
 
 

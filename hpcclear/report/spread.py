@@ -27,9 +27,7 @@ LEVELS = (0.5, 0.95, 0.99)
 """Probabilities of the quantiles that are stated."""
 
 INDEPENDENT = "computed for independent samples"
-USUALLY_WIDER = (
-    "computed for independent samples; with this sampling true intervals are usually narrower"
-)
+USUALLY_WIDER = f"{INDEPENDENT}; with this sampling true intervals are usually narrower"
 CHOSEN = "none: the designs were chosen, not sampled at random"
 
 

@@ -69,9 +69,8 @@ def to_table(content: xr.Dataset | Results, units: Sequence[str] = ()) -> DataFr
         made.add(variable)
     table = pd.DataFrame(made.columns)
     if len(made.rows) > 1:  # places of a grid that nothing fills
-        known = [
-            h for h, one in made.columns.items() if h not in made.keys and one.dtype.kind == "f"
-        ]
+        numbers = [h for h, one in made.columns.items() if one.dtype.kind == "f"]
+        known = [heading for heading in numbers if heading not in made.keys]
         table = table[table[known].notna().any(axis=1)].reset_index(drop=True) if known else table
     origin = {key: str(content.attrs.get(key, "")) for key in ("title", "scene", "scene_hash")}
     table.attrs = {
@@ -99,7 +98,8 @@ class _Table:
         variable = self.content[name]
         if (name in self.content.sizes and name not in self.rows) or "rival" in variable.dims:
             return  # labels of columns; rows against rows, which a text has as well
-        variable, dims = _lower_edges(variable, self.content, self.rows)
+        variable = _lower_edges(variable, self.content, self.rows)
+        dims = variable.dims
         across = [dim for dim in dims if dim not in self.rows]
         alone = not set(dims) & set(self.rows)
         sizes = [variable.shape[dims.index(dim)] for dim in across]
@@ -126,10 +126,8 @@ class _Table:
             self.keys |= {heading} if name in self.rows else set()
 
 
-def _lower_edges(
-    variable: Variable, content: Results, rows: tuple[str, ...]
-) -> tuple[Variable, tuple[str, ...]]:
-    """A variable and its dimensions; edges between bins as the lower edge of each bin, -inf of the first."""
+def _lower_edges(variable: Variable, content: Results, rows: tuple[str, ...]) -> Variable:
+    """A variable; edges between bins as the lower edge of each bin, -inf of the first."""
     if "edge" in variable.dims and rows == ("bin",):
         edges = variable.dims.index("edge")
         before = [(1 if k == edges else 0, 0) for k in range(len(variable.dims))]
@@ -137,7 +135,7 @@ def _lower_edges(
         if whole.shape[edges] == content.sizes["bin"]:
             dims = tuple("bin" if dim == "edge" else dim for dim in variable.dims)
             variable = Variable(dims, whole, variable.attrs, variable.name)
-    return variable, variable.dims
+    return variable
 
 
 def _label(content: Results, dim: str, place: int) -> str:

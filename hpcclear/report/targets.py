@@ -112,11 +112,8 @@ def settings(found: Results) -> Way | None:
     if "averaging_error" not in found or not len(looser) or numerics.rtol * near < tolerance.min():
         return None
     order = np.argsort(tolerance)
-    price = np.interp(
-        np.log(numerics.rtol),
-        np.log(tolerance[order]),
-        found["tolerance_seconds"].values[order],
-    )
+    known = np.log(tolerance[order]), found["tolerance_seconds"].values[order]
+    price = np.interp(np.log(numerics.rtol), *known)
     bias = _largest_bias(found)[looser[np.argmin(tolerance[looser])]]
     row = int((found["transient"].values <= waited).sum()) - 1
     column = int((found["averaged"].values <= averaged).sum()) - 1

@@ -98,10 +98,7 @@ def levels(squares: Array) -> tuple[Array, Array, Array]:
     """Levels in dB of the mean of mean squares (r, ...), N^2, of windows of `WINDOW` revolutions, and the ends of its
     confidence interval; NaN of nothing, -inf of an end at nothing."""
     mean, reach = squares.mean(axis=0), half_width(squares, WINDOW)
+    ends = np.maximum([mean, mean - reach, mean + reach], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        level, lower, upper = (
-            10.0 * np.log10(np.maximum(one, 0.0) / REFERENCE**2)
-            for one in (mean, mean - reach, mean + reach)
-        )
-    known = mean > 0.0
-    return tuple(np.where(known, one, np.nan) for one in (level, lower, upper))  # type: ignore[return-value]
+        level, lower, upper = np.where(mean > 0.0, 10.0 * np.log10(ends / REFERENCE**2), np.nan)
+    return level, lower, upper

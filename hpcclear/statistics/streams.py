@@ -194,10 +194,8 @@ class Accumulator:
 
     def remaining(self, blocks: int) -> Integers:
         """Numbers (n,) of the samples that are missing of blocks begun, and of so many of the next blocks."""
-        missing = [
-            np.flatnonzero(held["sample"] < 0) + number * self.block
-            for number, held in sorted(self._open.items())
-        ]
+        held = ((number * self.block, one["sample"]) for number, one in sorted(self._open.items()))
+        missing = [first + np.flatnonzero(samples < 0) for first, samples in held]
         later = range(self._next, -(-self.total // self.block))
         fresh = (n * self.block for n in later if n not in self._ahead and n not in self._open)
         for first in islice(fresh, blocks):

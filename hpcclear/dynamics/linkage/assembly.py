@@ -114,9 +114,8 @@ def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tup
             here, speed, _, _ = placed(assembly, f"{body.name}.{CENTER}", body.center)
             found.append((here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag))
     rows = np.broadcast_arrays(*itertools.chain(*found))
-    both = np.array(rows, float).reshape(
-        -1, 2, *np.shape(rows[0]) if rows else assembly.q.shape[1:]
-    )
+    shape = np.shape(rows[0]) if rows else assembly.q.shape[1:]
+    both = np.array(rows, float).reshape(-1, 2, *shape)
     return both[:, 0], both[:, 1]
 
 
@@ -132,10 +131,8 @@ def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Numbe
         along = -along
     offset, rate = own - base, own_speed - base_speed
     turned = 1j * along * spin
-    return (
-        (along.conjugate() * offset).real,
-        (along.conjugate() * rate).real + (turned.conjugate() * offset).real,
-    )
+    speed = (along.conjugate() * rate).real + (turned.conjugate() * offset).real
+    return (along.conjugate() * offset).real, speed
 
 
 def assemble_samples(
@@ -203,9 +200,8 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> Array:
     """From rough angles; where these lead into a corner, from angles near them, further and further off."""
     rng = np.random.default_rng(0)  # the same tries for the same mechanism
     guided = {split(joint.point)[0] for joint in loops.mechanism.joints if joint.kind == "slide"}
-    angles = np.array(
-        [one.kind == "angle" and one.body not in guided for one in loops.forest.coordinates], float
-    )
+    turns = (c.kind == "angle" and c.body not in guided for c in loops.forest.coordinates)
+    angles = np.array([*turns], float)
     nearest: tuple[float, int] = (math.inf, 0)
     for reach in (0.0, *np.linspace(0.2, 1.5, MOST_TRIES)):
         turned = reach * angles * rng.normal(size=loops.size)

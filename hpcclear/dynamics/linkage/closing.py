@@ -152,9 +152,8 @@ class Closing:
             turns = Mover("angle", carrier)
             moved[turns] = moved.get(turns, ZERO) + aside
         speed = dot(self.rate(*parts.places_of(joint)), along) + kin.spin(carrier) * aside
-        return {c: term for c, term in moved.items() if term}, self.writer.let(
-            f"v_{joint.name}", speed
-        )
+        moved = {column: term for column, term in moved.items() if term}
+        return moved, self.writer.let(f"v_{joint.name}", speed)
 
     def direction(self, joint: Joint) -> Vector:
         """Unit vector of a guide's line, along the ground's axes."""
@@ -162,9 +161,7 @@ class Closing:
         forest, write = self.kinematics.forest, self.writer
         held = Vector(ONE, ZERO)
         if forest.offsets[carrier] + joint.angle != 0.0:
-            held = Vector(
-                write.parameter(f"{joint.name}_cos"), write.parameter(f"{joint.name}_sin")
-            )
+            held = Vector(*(write.parameter(f"{joint.name}_{part}") for part in ("cos", "sin")))
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
 

@@ -34,9 +34,7 @@ class MotionEquations:
         self.mechanism, self.on, self.rows = mechanism, on, rows
         self.forest = forest(mechanism, cartesian)
         self.writer = Writer(rows.parameters, rows.free, hoist, RESERVED)
-        self.kinematics = Kinematics(
-            self.forest, self.writer, rows.coordinates, rows.velocities, rows.time, rows.curves
-        )
+        self.kinematics = Kinematics(self.forest, self.writer, rows)
         self.balance = Balance(self.forest, self.kinematics, self.writer, on.gravity)
         self.closing = Closing(self.kinematics, self.writer)
         self.columns = [Mover(one.kind, one.body) for one in self.forest.coordinates]
@@ -58,9 +56,8 @@ class MotionEquations:
         if is_round:
             function, frame = "joint_force", self._turns(contact)
         else:
-            touching = contact.joint.touch(
-                ContactWriter(self.closing, k, contact, apart), contact.part
-            )
+            terms = ContactWriter(self.closing, k, contact, apart)
+            touching = contact.joint.touch(terms, contact.part)
             function, frame = "wall_force", f"({', '.join(map(write.text, touching))})"
         made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
         given = f"joints[{k}], ({', '.join(relative)}), {frame}"

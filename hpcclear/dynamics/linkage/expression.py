@@ -219,9 +219,8 @@ class Writer:
             if self.free > at.WAVES:  # said at once: the rest of such a text takes minutes
                 count = f"more than {at.WAVES - at.OWN}"
                 reason = f"need too many products of lengths and masses: {count}"
-                remedy = (
-                    "Use fewer bodies, or shorter chains of them: each is coupled with all others"
-                )
+                remedy = "Use fewer bodies, or shorter chains of them"
+                remedy = f"{remedy}: each is coupled with all others"
                 raise InputError("mechanism.bodies", None, reason, remedy)
             comment = f"  # {self.derived[name]}" if name in self.derived else ""
             self.lines.append(f"{name} = par[{row} * W + i]{comment}")

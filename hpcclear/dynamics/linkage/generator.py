@@ -48,10 +48,8 @@ class LookUps:
         self.rows, self._free = text.rows, text.free
         self.read: set[str] = set()
         self.inputs: dict[str, None] = {}
-        m = forest.mechanism
-        self.found = {
-            name: self._of(one) for one in (*m.drives, *m.loads) for name in curves_of(one)
-        }
+        parts = (*forest.mechanism.drives, *forest.mechanism.loads)
+        self.found = {name: self._of(one) for one in parts for name in curves_of(one)}
 
     def _of(self, part: TableRow) -> LookUp:
         main = self._forest.mechanism.period
@@ -71,9 +69,7 @@ class LookUps:
         """The angle of a body from the x axis, divided by the turns after which the table repeats."""
         rows = self._rows
         write = Writer(self.rows, self._free, hoist=False)
-        kin = Kinematics(
-            self._forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves
-        )
+        kin = Kinematics(self._forest, write, rows)
         share = named(repr(1.0 / (at.TURN * turns)))
         text = write.text(kin.angle(body) * share)
         rate = write.text(kin.spin(self._forest.frames[body]) * share)
@@ -99,9 +95,8 @@ class Motion:
     derived: dict[str, str]  # texts of the derived parameters, by name, in parameters of `inputs`
     inputs: tuple[str, ...]  # names that `numbers.values` gives a number to
     constraints: tuple[str, ...]  # names of the multipliers
-    curves: Mapping[str, int] = field(
-        default_factory=dict
-    )  # rows of tabulated values, by drive or load
+    # rows of tabulated values, by drive or load
+    curves: Mapping[str, int] = field(default_factory=dict)
     # where each is looked up; those that move bodies first, since the angle of loads may be theirs
     look_ups: Mapping[str, LookUp] = field(default_factory=dict)
     # of loads by name, ordinary Python, that the text calls besides those of `elements`
@@ -188,9 +183,8 @@ class _Generator(MotionEquations):
             products = (moment * spin for moment, spin in zip(moments, spins, strict=True))
             power = write.let("power", sum(products, ZERO))
             self._rate(at.DRIVE_POWER, power)
-            write.line(
-                f"work[{self.rows.rates + at.ABS_DRIVE_POWER} * W + i] = abs({write.text(power)})"
-            )
+            row = self.rows.rates + at.ABS_DRIVE_POWER
+            write.line(f"work[{row} * W + i] = abs({write.text(power)})")
             rubbed = (rub.force * rub.speed for rub in self.rubbing)
             bent = (bend.loss() for bend in self.kinematics.bends.values())
             self._rate(at.DISSIPATION, sum((*self.losses, *rubbed, *bent), ZERO))
@@ -270,10 +264,8 @@ class _Generator(MotionEquations):
             if self.on.responses:
                 self._rate(at.FOLLOWED_SQUARE, along * along)
             return
-        x, y = (
-            self.writer.let(f"followed_{axis}", term)
-            for axis, term in zip("xy", kin.acceleration(kin.point(follow), second), strict=True)
-        )
+        both = zip("xy", kin.acceleration(kin.point(follow), second), strict=True)
+        x, y = (self.writer.let(f"followed_{axis}", term) for axis, term in both)
         self._rate(at.FOLLOWED_ACCELERATION, x)
         self._rate(at.FOLLOWED_ACROSS, y)
         self._rate(at.FOLLOWED_SQUARE, x * x + y * y)

@@ -4,13 +4,12 @@ A point is a sum of vectors, each held in a rotating frame: what does not change
 has only products with the frames' angular velocities, and the mass matrix only cosines and sines of differences of angles.
 """
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import NamedTuple
 
 from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
 from hpcclear.dynamics.linkage.bending import Bend
-from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.expression import Rows, Writer
 from hpcclear.dynamics.linkage.parts import GROUND, Drive, split
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -48,22 +47,18 @@ class Mover(NamedTuple):
 
 
 class Kinematics:
-    """Points, velocities and accelerations of a forest, as terms; `first` and `velocities`: rows of the stage in `work`."""
+    """Points, velocities and accelerations of a forest, as terms; of the `rows` those of the stage in `work` count."""
 
-    def __init__(
-        self, forest: Forest, writer: Writer, coordinates: int, velocities: int, time: int,
-        curves: Mapping[str, int] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
-        self.forest = forest
-        self._curves = curves
-        self.writer = writer
+    def __init__(self, forest: Forest, writer: Writer, rows: Rows) -> None:
+        self.forest, self.writer = forest, writer
+        self._curves = rows.curves
         self._points: dict[str, Point] = {}
         self._spins: dict[str, Term] = {}
         self._accelerations: dict[str, Term] = {}
         for k, one in enumerate(forest.coordinates):
-            writer.when_needed(f"work[{coordinates + k} * W + i]", one.name)
-            writer.when_needed(f"work[{velocities + k} * W + i]", self.speed_name(one))
-        writer.when_needed(f"work[{time} * W + i]", "time")
+            writer.when_needed(f"work[{rows.coordinates + k} * W + i]", one.name)
+            writer.when_needed(f"work[{rows.velocities + k} * W + i]", self.speed_name(one))
+        writer.when_needed(f"work[{rows.time} * W + i]", "time")
         for frame in dict.fromkeys(forest.frames.values()):
             if frame != GROUND:
                 self._turn(frame)
@@ -225,10 +220,8 @@ class Kinematics:
         body, point = split(place)
         forest = self.forest
         if body == GROUND:
-            x, y = forest.mechanism.ground[point]
-            fixed = Vector(
-                self._number(f"ground_{point}_x", x), self._number(f"ground_{point}_y", y)
-            )
+            both = zip("xy", forest.mechanism.ground[point], strict=True)
+            fixed = Vector(*(self._number(f"ground_{point}_{axis}", one) for axis, one in both))
             return Point({GROUND: fixed} if any(fixed) else {}, ())
         hang, frame = forest.hangs[body], forest.frames[body]
         if hang.joint is None:
@@ -297,9 +290,7 @@ class Kinematics:
             for frame, arm in point.arms.items()
             if frame != GROUND and self.forest.turning(frame)
         }
-        return found | {
-            Mover(move.kind, move.body): (move.frame, move.direction) for move in point.moves
-        }
+        return found | {Mover(m.kind, m.body): (m.frame, m.direction) for m in point.moves}
 
 
 def _extended(point: Point, frame: str, arm: Vector) -> Point:

@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.closing import Closing
-from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.expression import Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
@@ -83,7 +83,7 @@ class Loops:
         columns = [Mover(one.kind, one.body) for one in self.forest.coordinates]
         self.size = n = len(columns)
         writer = Writer({}, 0, hoist=False)
-        kinematics = Kinematics(self.forest, writer, 0, n, 2 * n)
+        kinematics = Kinematics(self.forest, writer, Rows(coordinates=0, velocities=n, time=2 * n))
         closing = Closing(kinematics, writer)
         owners: list[str] = []
         angles: list[bool] = []

@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.terms import ZERO, Term, named
 from hpcclear.dynamics.linkage.closing import Closing, dot
-from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.expression import Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.parts import GROUND, Number, is_pin
@@ -36,7 +36,7 @@ class Poses:
         self.forest = forest
         n = len(forest.coordinates)
         writer = Writer(rows, free, hoist=False)
-        kin = Kinematics(forest, writer, 0, n, 2 * n)
+        kin = Kinematics(forest, writer, Rows(coordinates=0, velocities=n, time=2 * n))
         lines: list[str] = []
         for k, body in enumerate(forest.mechanism.bodies):
             centre = kin.point(f"{body.name}.{CENTER}")

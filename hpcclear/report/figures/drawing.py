@@ -149,15 +149,13 @@ class _Drawing(NamedTuple):
         """Strokes on the far side of a line that does not move."""
         starts = middle + np.outer(np.arange(-half, half, self._mm(4.0)[0]), along)
         ends = starts + self._mm(3.0) * (outward - along)
-        self.sheet.axes.plot(
-            *np.stack([starts, ends]).T.swapaxes(1, 2), color=style.colour(_FIXED), lw=0.4
-        )
+        strokes = np.stack([starts, ends]).T.swapaxes(1, 2)
+        self.sheet.axes.plot(*strokes, color=style.colour(_FIXED), lw=0.4)
 
     def _ground(self) -> None:
         """Bearings of the ground as triangles on a hatched line; points that nothing turns about as crosses."""
-        pinned = {
-            getattr(j, end, "") for j in self.scene.linkage.joints for end in ("journal", "bearing")
-        }
+        ends, joints = ("journal", "bearing"), self.scene.linkage.joints
+        pinned = {getattr(joint, end, "") for joint in joints for end in ends}
         for name, point in self.placed.ground.items():
             if f"ground.{name}" in pinned:
                 foot = point + self._mm(1.0) * np.array([[0, 0], [-5, -9], [5, -9], [0, 0]])
@@ -272,13 +270,11 @@ class _Drawing(NamedTuple):
                 if abs(apart) * self.sheet.per_m < 1.0 or (k, round(apart, 9)) in drawn:
                     continue
                 drawn.add((k, round(apart, 9)))
-                text = labels.quantity(apart, "m")
+                text = labels.quantity(apart, "m").removeprefix("-")
                 ends = [origin, point] if apart > 0.0 else [point, origin]
                 levels = np.concatenate([low[1 - k] - steps, high[1 - k] + steps])
                 # across x is y, across y is -x
-                self.sheet.dimension(
-                    ends, text.removeprefix("-"), np.eye(2)[k], levels * (1 - 2 * k)
-                )
+                self.sheet.dimension(ends, text, np.eye(2)[k], levels * (1 - 2 * k))
 
     def _joint_words(self) -> list[tuple[Array, list[str], str]]:
         """Names of joints with their clearances, those at one place together."""

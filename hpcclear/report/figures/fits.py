@@ -40,11 +40,8 @@ def warnings(kind: str, content: Results | None) -> list[str]:
         return []
     model = "Kriging model" if "surrogate" not in content else "surrogate"
     word, known = ("response surface", of_surfaces) if kind == "sensitivity" else (model, of_models)
-    return [
-        f"{word} in {', '.join(name.split())}: {text}"
-        for name, r2 in known(content).items()
-        if (text := verdict(r2))
-    ]
+    said = {name: verdict(r2) for name, r2 in known(content).items()}
+    return [f"{word} in {', '.join(n.split())}: {text}" for n, text in said.items() if text]
 
 
 def captioned(caption: str) -> Callable[[Results], str]:

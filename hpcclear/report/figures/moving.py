@@ -66,9 +66,8 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     phi, theta = shown["crank_angle"].values, shown["rod_angle"].values
     crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
     names = texts_in(shown, "joint")
-    near_pin, far_pin = (
-        e[:, names.index(name)] if name in names else np.zeros_like(rod) for name in JOINTS
-    )
+    known = {name: e[:, k] for k, name in enumerate(names)}
+    near_pin, far_pin = (known.get(name, np.zeros_like(rod)) for name in JOINTS)
     # crank length * crank = rod - u2 * along + e12
     both = np.column_stack([crank.ravel(), along.ravel()])
     pin = float(np.linalg.lstsq(both, (rod + near_pin).ravel(), rcond=None)[0][0]) * crank
@@ -84,10 +83,8 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
 
 
 def _linkage(shown: Results) -> Drawn:
-    names = [str(point).partition(".")[0] for point in shown["point"].values]
-    bodies = [
-        [k for k, name in enumerate(names) if name == body] for body in texts_in(shown, "body")
-    ]
+    owners = np.array([str(point).partition(".")[0] for point in shown["point"].values])
+    bodies = [np.flatnonzero(owners == body).tolist() for body in texts_in(shown, "body")]
     points = np.stack([shown["point_x"].values, shown["point_y"].values], axis=-1)
     angles = shown["body_angle"].values
     # without the whole turns before, which would cost digits

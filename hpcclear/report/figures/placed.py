@@ -22,14 +22,10 @@ class Placed:
         for body in mechanism.bodies:
             x, y, angle = poses[body.name]
             turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            self.bodies[body.name] = {
-                name: np.array([x, y]) + turn @ np.subtract(point, body.own_center)
-                for name, point in body.own_points.items()
-            }
+            arms = {n: np.subtract(p, body.own_center) for n, p in body.own_points.items()}
+            self.bodies[body.name] = {n: np.array([x, y]) + turn @ arm for n, arm in arms.items()}
             self.angles[body.name] = angle
-        self.ground = {
-            point.name: np.array([point.x, point.y]) for point in mechanism.ground.points
-        }
+        self.ground = {one.name: np.array([one.x, one.y]) for one in mechanism.ground.points}
         sliders: list[Any] = [j for j in mechanism.joints if getattr(j, "height", None)]
         self._sliders = [
             self.at(one.point) + side * one.length for one in sliders for side in (-0.5, 0.5)

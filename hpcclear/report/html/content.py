@@ -96,10 +96,8 @@ def read(*places: str | Path) -> Content:
     if not files and not responses:
         reason = "there is no result file in it"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
-    if (
-        len({str(one.attrs["scene_hash"]) for one in files.values() if "scene_hash" in one.attrs})
-        > 1
-    ):
+    scenes = {one.attrs["scene_hash"] for one in files.values() if "scene_hash" in one.attrs}
+    if len(scenes) > 1:
         text = "The files in this directory were made from different scenes: do not compare them."
         troubles = [*troubles, text]
     every = tuple(troubles)

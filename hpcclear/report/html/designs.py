@@ -72,12 +72,9 @@ def _role(end: str, own: Results) -> str:
 
 def _lightest(verified: Results, case: str, chosen: list[str]) -> str:
     """The design of a case with the lowest sum of masses within its constraints; "" if one of the chosen is as light."""
-    own = [
-        one
-        for one in each(verified, "design")
-        if counts(one) and text_in(one, "design").startswith(f"{case} ") and alike.satisfies(one)
-    ]
-    weights = {text_in(one, "design"): sum(map(float, alike.masses(one))) for one in own}
+    good = (one for one in each(verified, "design") if counts(one) and alike.satisfies(one))
+    weights = {text_in(one, "design"): sum(map(float, alike.masses(one))) for one in good}
+    weights = {name: one for name, one in weights.items() if name.startswith(f"{case} ")}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}
     if not known:
         return ""
@@ -155,9 +152,8 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
 def _cell(one: Results, name: str, scale: labels.Scale) -> str:
     """A value, if it was simulated with the half-width of its confidence interval."""
     value, low, high = np.array(labels.estimate(one, name.removesuffix("_true"))) * scale.factor
-    return (
-        labels.paired(value, (high - low) / 2) if np.isfinite([value, low]).all() else number(value)
-    )
+    known = np.isfinite([value, low]).all()
+    return labels.paired(value, (high - low) / 2) if known else number(value)
 
 
 PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs, "verification"),)

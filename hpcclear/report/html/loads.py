@@ -66,20 +66,11 @@ def _bearings(found: dict[str, list[bearings.Bearing]]) -> PageTable:
     """The bearings of all responses; a column of pressures where the length of a bearing is known."""
     every = [(name, one) for name, each in found.items() for one in each]
     pressed = bearings.pressures([one for _, one in every])
-    header = (
-        "response",
-        "joint",
-        "peak force",
-        "at crank angle",
-        "mean force",
-        "contact",
-        "mean gap",
-    )
-    rows = [
-        [*_row(name, one), *(Number(shown(one)) for _, shown in pressed)] for name, one in every
-    ]
-    titles = [*header, *(title for title, _ in pressed)]
-    return _table(titles, rows, "Bearings, over the averaged revolutions")
+    header = ["response", "joint", "peak force", "at crank angle", "mean force"]
+    header += ["contact", "mean gap", *(title for title, _ in pressed)]
+    further = [shown for _, shown in pressed]
+    rows = [[*_row(name, one), *(Number(shown(one)) for shown in further)] for name, one in every]
+    return _table(header, rows, "Bearings, over the averaged revolutions")
 
 
 def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: str) -> PageTable:

@@ -55,16 +55,14 @@ def designs_of_a_paper(content: Content) -> list[object]:
     verified = content.files.get("verification")
     if verified is None or "mean_paper" not in verified:
         return []
-    printed = {
-        text_in(one, "design"): one for one in each(verified, "design") if labels.is_printed(one)
-    }
+    printed = [text_in(k, "design") for k in each(verified, "design") if labels.is_printed(k)]
     words = (
         "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
         "nothing was fitted to them."
     )
     columns = (*SIMULATED[:2], *_PRINTED)
     title = "Table 4: designs of the paper, by simulation with 95 % half-widths and as printed"
-    return [words, table_of(verified, {name: name for name in printed}, columns, title)]
+    return [words, table_of(verified, dict(zip(printed, printed, strict=True)), columns, title)]
 
 
 def paper(content: Content) -> list[object] | None:

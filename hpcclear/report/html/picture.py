@@ -7,7 +7,6 @@ import numpy as np
 
 from hpcclear.report.figures import labels, motion, moving, sketch
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import quantity
 from hpcclear.report.merit import goals_of, leading_goals, recommended
 from hpcclear.report.screens.study import simulated
 from hpcclear.results.content import Results, text_in, texts_in
@@ -120,12 +119,8 @@ def _values(one: Results) -> list[list[str]]:
 
 def _predicted(one: Results) -> list[list[str]]:
     """Mean and standard deviation by the surrogate; none where they are not known."""
-    known = ((words, one.get(f"{name}_surrogate")) for name, words in _WORDS.items())
-    return [
-        [words, str(quantity(float(value), str(value.attrs["units"])))]
-        for words, value in known
-        if value is not None
-    ]
+    known = {words: one.get(f"{name}_surrogate") for name, words in _WORDS.items()}
+    return [[words, str(labels.value(own))] for words, own in known.items() if own is not None]
 
 
 def series(response: Results) -> list[dict[str, object]]:

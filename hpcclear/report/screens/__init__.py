@@ -4,7 +4,7 @@ from dataclasses import replace
 from importlib import import_module
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Screen, Trust, trusted
+from hpcclear.report.screen import Screen, red, trusted
 
 _MAKERS = {
     "verification": "study.screen",
@@ -34,6 +34,6 @@ def screen_of(content: Content) -> Screen | None:
             first = replace(made, title=content.attribute("about_title"))
             if not content.troubles:
                 return first
-            lost = Trust.red(f"Not all files are here: {content.troubles[0]}", "reproduce")
+            lost = red(f"Not all files are here: {content.troubles[0]}", "reproduce")
             return replace(first, trust=trusted([*first.trust, lost]))
     return None

@@ -8,7 +8,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import bearings, failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted
 from hpcclear.results.content import Results
 
 MOST = 0.5
@@ -82,9 +82,9 @@ def _share(found: Results, flag: Flag) -> float:
 def _trust(found: Results) -> Iterator[Trust]:
     good = found["status"].values == Status.OK
     for text in failures.explained(found)[:2]:
-        yield (Trust.amber if good.any() else Trust.red)(text, "quality")
+        yield (amber if good.any() else red)(text, "quality")
     if good.all():
-        yield Trust.green("No simulation failed", "quality")
+        yield green("No simulation failed", "quality")
     outside = bearings.outside(found) or "forces are indicative"
     for flag, text in (
         (Flag.BEYOND_HERTZ, f"contact model outside its range, {outside}"),
@@ -92,14 +92,14 @@ def _trust(found: Results) -> Iterator[Trust]:
         (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
     ):
         if share := _share(found, flag):
-            level = Trust.red if share > MOST and flag is not Flag.LATCHED else Trust.amber
+            level = red if share > MOST and flag is not Flag.LATCHED else amber
             yield level(f"{spread.percent(share)} of the samples: {text}", "quality")
     name = "objective_limit" if "objective_limit" in found else "objective_uncertainty"
     if not np.isfinite(found[name].values).any():
         text = "The half-width of a single f was not checked (numerics.target_error)"
-        yield Trust.amber(text, "quality")
+        yield amber(text, "quality")
     if "sampling" not in found.attrs:
-        yield Trust.amber("The designs were chosen, not drawn: no intervals", "quality")
+        yield amber("The designs were chosen, not drawn: no intervals", "quality")
 
 
 def map_of_motion(found: Results, content: Content) -> Screen:
@@ -126,14 +126,14 @@ def map_of_motion(found: Results, content: Content) -> Screen:
             Tile("range of f", labels.between(float(f.min()), float(f.max()), unit)),
         )
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    level = Trust.green if count == cells else Trust.amber
+    level = green if count == cells else amber
     trust = [level(f"{count} of {cells} cells without failure", "quality")]
     moving = (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
     if open_ := sum(n for regime, n in kinds if regime in moving):
         text = f"{open_} cells have not settled: longer transients would decide"
-        trust.append(Trust.amber(text, "quality"))
+        trust.append(amber(text, "quality"))
     if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
-        level = Trust.red if share > MOST else Trust.amber
+        level = red if share > MOST else amber
         text = f"contact model outside its range, {bearings.outside(found)}"
         trust.append(level(f"{spread.percent(share)} of the cells: {text}", "quality"))
     rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
@@ -155,7 +155,7 @@ def bifurcation(found: Results, content: Content) -> Screen:
     if failed < count:
         ends = float(np.nanmin(seen.values)), float(np.nanmax(seen.values))
         headline = f"{what}: {labels.between(*ends, unit)}"
-    level = Trust.amber if failed else Trust.green
+    level = amber if failed else green
     trust = level(f"{count - failed} of {count} values without failure", "reproduce")
     about = f"{count} values, {crossings} revolutions each"
     return Screen(headline, (about,), trust=(trust,), figures=("bifurcation",))
@@ -175,8 +175,8 @@ def statistics(found: Results, content: Content) -> Screen:
         headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
         tiles.append(Tile("mean of f", shown[0], within=f"standard error {error}"))
         tiles.append(Tile("std. deviation of f", shown[1]))
-    level = Trust.amber if good < total else Trust.green
+    level = amber if good < total else green
     lost = level(f"{good} of {total} simulations without failure", "quality")
-    single = Trust.amber("The half-width of a single f was not checked", "quality")
+    single = amber("The half-width of a single f was not checked", "quality")
     about, trust = (f"f: {labels.objective(found)}",), trusted([lost, single])
     return Screen(labels.sentence(headline, found), about, tiles=tuple(tiles), trust=trust)

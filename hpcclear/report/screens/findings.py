@@ -10,7 +10,7 @@ from hpcclear.report import identified, targets
 from hpcclear.report.figures import effects as screening
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted, upper
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted, upper
 from hpcclear.results.content import Results
 
 MOST = 4
@@ -20,12 +20,12 @@ MOST = 4
 def machine(found: Results, content: Content) -> Screen:
     """Return the first screen of an identified machine."""
     known = "interval" in found
-    trust = [Trust.red(upper(text), "identify") for text in identified.warnings(found)]
+    trust = [red(upper(text), "identify") for text in identified.warnings(found)]
     if known and not trust:
-        trust.append(Trust.green("The model explains every signal", "identify"))
+        trust.append(green("The model explains every signal", "identify"))
     if known:
         coverage = float(np.min(found["coverage"].values))
-        level = Trust.green if coverage >= 0.9 else Trust.amber
+        level = green if coverage >= 0.9 else amber
         text = f"Check: the 95 % interval holds for {100 * coverage:.0f} % of simulated machines"
         trust.append(level(text, "identify"))
     unknown = _unknowns(found) if known else []
@@ -34,10 +34,8 @@ def machine(found: Results, content: Content) -> Screen:
         last = unknown[-found.sizes["unknown"] :]
         headline = "; ".join(f"{upper(label)}: {text}" for label, text in last[:2])
     failed = known and not found["explained"].values.all()
-    tiles = [
-        Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
-        for label, text in unknown
-    ]
+    parts = [(label, *text.partition(" (")) for label, text in unknown]
+    tiles = [Tile(label, text, within=more.rstrip(")")) for label, text, _, more in parts]
     above = {label.partition(",")[0] for label, _ in unknown if len(unknown) <= MOST}
     shown = (line for line in identified.lines(found) if line.label not in above | {"calibration"})
     rows = tuple(ScreenRow(line.label, (line.text,)) for line in shown)
@@ -70,11 +68,10 @@ def effects(found: Results, content: Content) -> Screen:
     tolerance = f"{100 * float(found.attrs['tolerance']):g} %"
     chosen = int(np.argmax(found["recommended"].values))
     names, saved = screening.named(found, chosen), screening.saving(found, chosen, seconds)
-    headline = (
-        f"Within {tolerance}, {', '.join(names)} can be neglected: run time saved {saved.words}"
-        if chosen
-        else f"No effect can be neglected within {tolerance}"
-    )
+    headline = f"No effect can be neglected within {tolerance}"
+    if chosen:
+        more = f"run time saved {saved.words}"
+        headline = f"Within {tolerance}, {', '.join(names)} can be neglected: {more}"
     rows = []
     for k in range(1, found.sizes["variant"]):
         change = screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0]))
@@ -93,26 +90,23 @@ def _screened(found: Results) -> Iterator[Trust]:
     decisions = found["decision"].values[1:]
     if open_ := int((decisions == Verdict.UNDECIDED).sum()):
         text = f"{open_} of {len(decisions)} variants are undecided: more samples would decide"
-        yield Trust.amber(text, "effects")
+        yield amber(text, "effects")
     else:
-        yield Trust.green("Every variant is decided", "effects")
+        yield green("Every variant is decided", "effects")
     if failed := int(np.sum(found["failed"].values)):
-        yield Trust.amber(f"{failed} simulations failed", "effects")
+        yield amber(f"{failed} simulations failed", "effects")
     level = f"{100 * float(found.attrs['confidence']):.0f} %"
-    yield Trust.green(f"Intervals of {level}, from averages over the same points", "effects")
+    yield green(f"Intervals of {level}, from averages over the same points", "effects")
 
 
 def accuracy(found: Results, content: Content) -> Screen:
     """Return the first screen of accuracy against run time."""
     own = targets.settings(found)
     ways = [(target, targets.cheapest(found, target)) for target in targets.TARGETS]
-    rows = [
-        ScreenRow(
-            f"error of {100 * target:g} %",
-            ("not reached", "") if way is None else (way.words, targets.seconds(way.seconds)),
-        )
-        for target, way in ways
-    ]
+    rows = []
+    for target, way in ways:
+        cells = ("not reached", "") if way is None else (way.words, targets.seconds(way.seconds))
+        rows.append(ScreenRow(f"error of {100 * target:g} %", cells))
     if own is not None:
         rows.append(ScreenRow("your settings", (own.words, targets.seconds(own.seconds))))
         headline = f"Your settings: error of f at most {100 * own.error:.2g} %, {targets.seconds(own.seconds)} per design"
@@ -122,8 +116,8 @@ def accuracy(found: Results, content: Content) -> Screen:
         if reached:
             target, way = reached[-1]
             headline = f"An error of f of {100 * target:g} % costs {targets.seconds(way.seconds)} of one core per design"
-    known = Trust.green("Errors against references with much tighter settings", "accuracy")
-    times = Trust.amber("Times are those of one core of this machine", "accuracy")
+    known = green("Errors against references with much tighter settings", "accuracy")
+    times = amber("Times are those of one core of this machine", "accuracy")
     return Screen(
         headline, header=("target", "settings", "time of one core"), rows=tuple(rows),
         trust=trusted([known, times]), figures=("accuracy",),

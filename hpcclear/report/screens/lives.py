@@ -10,7 +10,18 @@ from hpcclear.report.figures.labels import quantity
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
-from hpcclear.report.screen import Screen, ScreenRow, ShareBar, Tile, Trust, trusted, upper
+from hpcclear.report.screen import (
+    Screen,
+    ScreenRow,
+    ShareBar,
+    Tile,
+    Trust,
+    amber,
+    green,
+    red,
+    trusted,
+    upper,
+)
 from hpcclear.results.content import Results, texts_in
 from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
 
@@ -28,7 +39,7 @@ REASONS = {
 def screen(lives: Results, content: Content) -> Screen:
     """Return the first screen of service lives."""
     if not followed(lives).any():
-        failed = (Trust.red(text, "lives") for text in _failed(lives))
+        failed = (red(text, "lives") for text in _failed(lives))
         return Screen("Every service life failed", trust=trusted(failed))
     rows = tuple(ScreenRow(name, tuple(cells)) for name, *cells in _clearances(lives))
     causes = [ShareBar(f"{name}, {joint}", share, np.nan) for joint, name, share in _inputs(lives)]
@@ -37,10 +48,9 @@ def screen(lives: Results, content: Content) -> Screen:
     return Screen(
         _headline(lives),
         (f"{lives.sizes['life']} service lives", length),
-        "",
-        tuple(_tiles(lives)),
-        ("radial clearance", "new (median)", "final (median)", "5 to 95 %"),
-        rows,
+        tiles=tuple(_tiles(lives)),
+        header=("radial clearance", "new (median)", "final (median)", "5 to 95 %"),
+        rows=rows,
         trust=trusted(_trust(lives)),
         bars=tuple(causes),
         causes=f"Squared rank correlation of wear with its main input: {named}." if named else "",
@@ -105,18 +115,18 @@ def _tiles(lives: Results) -> Iterator[Tile]:
 
 def _trust(lives: Results) -> Iterator[Trust]:
     count = lives.sizes["life"]
-    yield from (Trust.amber(upper(text), "lives") for text in doubts(lives))
+    yield from (amber(upper(text), "lives") for text in doubts(lives))
     failed = _failed(lives)
-    yield from (Trust.amber(text, "lives") for text in failed)
+    yield from (amber(text, "lives") for text in failed)
     if not failed:
-        yield Trust.green("No simulation failed", "lives")
+        yield green("No simulation failed", "lives")
     open_ = int((lives["end_reason"].values == "cycles").sum())
     if open_ and _is_limited(lives):
         text = f"{open_} of {count} lives reached no limit: raise wear.cycles for their length"
-        yield Trust.amber(text, "lives")
+        yield amber(text, "lives")
     if count < (least := fewest(0.05)):
         text = f"{count} lives do not bound the 5th percentile from below; {least} would"
-        yield Trust.amber(f"{text} (wear.lives)", "lives")
+        yield amber(f"{text} (wear.lives)", "lives")
 
 
 def _failed(lives: Results) -> list[str]:
@@ -192,10 +202,8 @@ def _lifetimes(lives: Results) -> Iterator[list[str]]:
     if not _is_limited(lives):
         yield ["service life", "no threshold given (wear.limit)"]
         return
-    for name, unit, beyond in (
-        ("lifetime", "revolutions", cycles),
-        ("lifetime_hours", "h", float((cycles * each).min())),
-    ):
+    hours = float((cycles * each).min())
+    for name, unit, beyond in ("lifetime", "revolutions", cycles), ("lifetime_hours", "h", hours):
         texts = [
             value + ("" if low == high == value else f" (95 % CI {low} to {high})")
             for value, low, high in spread(lives, name, beyond)

@@ -8,7 +8,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, trusted
+from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted
 from hpcclear.results.content import Results
 
 
@@ -21,7 +21,7 @@ def screen(response: Results, content: Content) -> Screen:
         return Screen(
             f"The simulation failed: {said}",
             doubt="no number of it is a result",
-            trust=(Trust.red(status.remedy, "bearings"),),
+            trust=(red(status.remedy, "bearings"),),
             steps=(status.remedy,),
         )
     loads = bearings.bearings(response)
@@ -89,27 +89,27 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
     flags, place = int(response["flags"]), "bearings"
     if flags & Flag.BEYOND_HERTZ:
         why = bearings.outside(response) or "forces are indicative"
-        yield Trust.red(f"Contact model outside its range: {why}", place)
+        yield red(f"Contact model outside its range: {why}", place)
     elif loads:
-        yield Trust.green("Contact model within its range", place)
+        yield green("Contact model within its range", place)
     if flags & Flag.TARGET_MISSED:
-        yield Trust.red("f is not known to numerics.target_error", place)
+        yield red("f is not known to numerics.target_error", place)
     if flags & Flag.LATCHED:
         text = "A joint never left contact: f may depend on the integration tolerance"
-        yield Trust.amber(text, place)
+        yield amber(text, place)
     f, reach = float(response["objective"]), half_width(response)
     if not np.isfinite(reach):
-        yield Trust.amber("The interval of f is not known: set numerics.target_error", place)
+        yield amber("The interval of f is not known: set numerics.target_error", place)
     elif reach > bearings.SENSITIVE * abs(f):
         text = f"f is sensitive to initial conditions or tolerance: {_within(response)}"
-        yield Trust.amber(text, place)
+        yield amber(text, place)
     else:
-        yield Trust.green(f"f is known to {_within(response)}", place)
+        yield green(f"f is known to {_within(response)}", place)
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
-        level = Trust.green if regime is Regime.REGULAR else Trust.amber
+        level = green if regime is Regime.REGULAR else amber
         yield level(f"Motion: {regime.meaning}", place)
     for text in str(response.attrs.get("cautions", "")).splitlines():
-        yield Trust.amber(text, place)
+        yield amber(text, place)
 
 
 def _steps(response: Results) -> Iterator[str]:

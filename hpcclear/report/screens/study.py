@@ -24,9 +24,12 @@ from hpcclear.report.screen import (
     Span,
     Tile,
     Trust,
+    amber,
     change,
+    green,
     lower,
     percent,
+    red,
     trusted,
     upper,
     within,
@@ -208,12 +211,12 @@ def _remark(of: Recommended) -> str:
 def _trust(of: Recommended) -> Iterator[Trust]:
     best = of.best
     for own in constraints_of(best):
-        level = Trust.green if own.verdict is Verdict.HOLDS else Trust.red
+        level = green if own.verdict is Verdict.HOLDS else red
         more = own.deciding and f"; {own.deciding}"
         yield level(f"Constraint {WORDS[own.verdict]}: {own.goal}{more}", "designs")
     share = beyond_hertz(best)
     if share > MANY:
-        level = Trust.red if share > MOST else Trust.amber
+        level = red if share > MOST else amber
         runs = "all runs" if share == 1.0 else f"{100 * share:.0f} % of runs"
         why = bearings.outside(of.files["verification"]) or "contact model outside its range"
         yield level(f"{upper(why)} ({runs})", "bearings")
@@ -221,34 +224,34 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].values > scatter.SOME
         many = "" if moved.all() else f" in {int(moved.sum())} of {moved.size} designs"
-        yield Trust.amber(f"Chaotic motion{many}: values are means", "quality")
+        yield amber(f"Chaotic motion{many}: values are means", "quality")
     yield from _failures(of)
     place = "sensitivities"
     if any(abs(error) > FAR for error in answer.surrogate_errors(best)):
-        yield Trust.amber("Surrogate error above 20 %: a better design may have been missed", place)
+        yield amber("Surrogate error above 20 %: a better design may have been missed", place)
     if (half := scatter.half_width(of.files.get("sensitivity"))) > scatter.UNSURE:
-        yield Trust.amber(f"Sobol indices ± {100 * half:.0f} %: ranking only", place)
+        yield amber(f"Sobol indices ± {100 * half:.0f} %: ranking only", place)
     kinds = ("sensitivity", "kriging")
     if poor := sum(len(fits.warnings(kind, of.files.get(kind))) for kind in kinds):
-        yield Trust.amber(f"{poor} surrogate fits are poor", place)
+        yield amber(f"{poor} surrogate fits are poor", place)
 
 
 def _accuracy(best: Results) -> Trust:
     """The half-widths of mean and standard deviation, and whether they are those that were requested."""
     if missed := text_in(best, "accuracy_missed"):
-        return Trust.red(f"Requested accuracy not reached: {missed}", "quality")
+        return red(f"Requested accuracy not reached: {missed}", "quality")
     scene = scene_of(best)
     asked = scene.study.accuracy if scene is not None and scene.study is not None else None
     if asked is not None and "accuracy_missed" in best:
-        return Trust.green("Requested accuracy reached", "quality")
+        return green("Requested accuracy reached", "quality")
     known = []
     for stem in ("mean", "deviation"):
         value, low, high = labels.estimate(best, stem)
         if value and np.isfinite([low, high]).all():
             known.append(f"{_USUAL[stem]} {percent((high - low) / 2.0 / abs(value))}")
     if not known:
-        return Trust.amber("Intervals of mean and standard deviation are not known", "quality")
-    return Trust.green(f"Accuracy: {', '.join(known)}", "quality")
+        return amber("Intervals of mean and standard deviation are not known", "quality")
+    return green(f"Accuracy: {', '.join(known)}", "quality")
 
 
 def _failures(of: Recommended) -> Iterator[Trust]:
@@ -256,12 +259,12 @@ def _failures(of: Recommended) -> Iterator[Trust]:
     failed = int(best["failed"]) if "failed" in best else 0
     if failed:
         text = f"{failed} of {int(best['samples'])} simulations of this design failed"
-        yield Trust.amber(text, "quality")
+        yield amber(text, "quality")
     status = np.zeros(0) if samples is None else samples["status"].values
     if lost := int((status != Status.OK).sum()):
-        yield Trust.amber(f"{lost} of {len(status)} samples failed", "quality")
+        yield amber(f"{lost} of {len(status)} samples failed", "quality")
     if not failed and not lost:
-        yield Trust.green("No simulation failed", "quality")
+        yield green("No simulation failed", "quality")
 
 
 def _bars(of: Recommended) -> tuple[list[ShareBar], str]:

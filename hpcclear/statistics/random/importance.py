@@ -253,9 +253,8 @@ class Rare:
         self.simulations += theirs.size
         ours, weights = self.f[:, :count], self.weights[:, :count]
         both = np.isfinite(ours) & np.isfinite(theirs)
-        each = [
-            np.where(both & (f > self.limit), weights, 0.0).mean(axis=1) for f in (ours, theirs)
-        ]
+        beyond = (np.where(both & (f > self.limit), weights, 0.0) for f in (ours, theirs))
+        each = [one.mean(axis=1) for one in beyond]
         apart, least = each[0] - each[1], min(one.mean() for one in each)
         error = float(spread((apart - apart.mean())[None])[0])
         # a bias that chance may have made counts for nothing

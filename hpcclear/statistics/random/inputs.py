@@ -76,14 +76,11 @@ class Wiring:
             parts = [part for part in parts if not part[1] & sources]
             dims = sorted([dim, *(d for part in joined for d in part[0])])
             parts.append((dims, sources.union(*(part[1] for part in joined))))
-        groups = [
-            Group(
-                tuple(dims),
-                tuple(name for name in self.random if name in sources),
-                any(s in self.column for d in dims for s in self._sources(self.names[d])),
-            )
-            for dims, sources in parts
-        ]
+        groups = []
+        for dims, shared in parts:
+            own = tuple(name for name in self.random if name in shared)
+            moves = any(s in self.column for d in dims for s in self._sources(self.names[d]))
+            groups.append(Group(tuple(dims), own, moves))
         return (*groups, *([Group(tuple(calm), (), True)] if calm else ()))
 
     def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -111,8 +108,8 @@ class Wiring:
         for k, dim in enumerate(dims):
             name = self.names[dim]
             arguments = [value(source) for source in self._sources(name)]
-            made = self.derived[name].function(*arguments) if name in self.derived else arguments[0]
-            out[:, :, k] = made
+            derived = self.derived.get(name)
+            out[:, :, k] = arguments[0] if derived is None else derived.function(*arguments)
         return out
 
 

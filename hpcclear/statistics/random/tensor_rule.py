@@ -122,10 +122,8 @@ class TensorRule:
             out = []
             for level in levels:
                 draws = {k: np.array([[value]]) for k, value in zip(others, level, strict=True)}
-                at, about = (
-                    wiring.places(dims, designs, draws | {name: one[None]}) / narrow
-                    for one in (nodes, centres)
-                )
+                both = (draws | {name: one[None]} for one in (nodes, centres))
+                at, about = (wiring.places(dims, designs, one) / narrow for one in both)
                 squares = ((at[:, :, None] - about[:, None]) ** 2).sum(-1)
                 out.append(np.einsum("j,njc->nc", weights, np.exp(-0.5 * squares)))
             return np.array(out)

@@ -61,9 +61,8 @@ def contributions(inputs: Array, f: Array, groups: Sequence[int]) -> Contributio
     level = float(f[good].mean())
     if not float(f[good].std()) > 1e-9 * abs(level):
         return _always(0.0, size)
-    moments = np.array(
-        [_moments(x[k][good[k]], f[k][good[k]] - level, terms) for k in range(len(f))]
-    )
+    each = ((own[kept], its[kept] - level) for own, its, kept in zip(x, f, good, strict=True))
+    moments = np.array([_moments(*one, terms) for one in each])
     whole = _Fit(moments.sum(axis=0), terms)
     left = [_Fit(moments.sum(axis=0) - one, terms) for one in moments]
 

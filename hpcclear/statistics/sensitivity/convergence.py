@@ -108,9 +108,8 @@ def _plateau_start(slope: Array, error: Array, critical: Array, tolerance: float
     while start > 0:
         wide, short = start - 1, slice(start, None)
         quantile = np.maximum(critical[wide], critical[short])
-        allowed = np.maximum(
-            quantile * np.hypot(error[wide], error[short]), tolerance * np.abs(slope[short])
-        )
+        chance = quantile * np.hypot(error[wide], error[short])
+        allowed = np.maximum(chance, tolerance * np.abs(slope[short]))
         if np.any(np.abs(slope[wide] - slope[short]) > allowed):
             break
         start -= 1

@@ -6,6 +6,7 @@ midpoints. `hpcclear.statistics.sensitivity.convergence` says in which of them i
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,13 +130,10 @@ def design_intervals(
     upper = middle + fractions[:, np.newaxis] * half
     intervals = np.stack([lower, upper], axis=2)
     intervals[0] = limits  # bit for bit
-    blocks = [
-        np.column_stack([latin_hypercube(n, interval, rng), np.full(n, gap)])
-        for interval in intervals
-        for gap in gaps
-        for n in (settings.n_points, settings.n_test)
-    ]
-    return IntervalDesign(np.vstack(blocks), intervals, gaps, settings)
+    each = product(intervals, gaps, (settings.n_points, settings.n_test))
+    blocks = ((latin_hypercube(n, one, rng), np.full(n, gap)) for one, gap, n in each)
+    points = np.vstack([np.column_stack(block) for block in blocks])
+    return IntervalDesign(points, intervals, gaps, settings)
 
 
 def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityHistory:

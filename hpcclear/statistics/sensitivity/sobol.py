@@ -51,9 +51,8 @@ def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Ar
     box = np.asarray(bounds, float)
     d = len(box)
     replicates = min(REPLICATES, n_rows)
-    unit = np.concatenate(
-        [qmc.Sobol(2 * d, rng=rng).random(n_rows // replicates) for _ in range(replicates)]
-    )
+    length = n_rows // replicates
+    unit = np.concatenate([qmc.Sobol(2 * d, rng=rng).random(length) for _ in range(replicates)])
     unit = np.stack([unit[:, :d], unit[:, d:]])
     a, b = box[:, 0] + unit * (box[:, 1] - box[:, 0])
     own = np.eye(d, dtype=bool)[:, np.newaxis]  # of each input, which column is B's
@@ -77,10 +76,8 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
         raise InputError("values", int(np.count_nonzero(~finite)), reason, remedy)
     first, total = indices = _indices(y)
     reach = _jackknife(y, replicate) * student(confidence, max(len(np.unique(replicate)) - 1, 1))
-    intervals = np.stack([indices - reach, indices + reach], axis=-1)
-    return SobolIndices(
-        first, total, intervals[0], intervals[1], float(y[:2].mean()), float(y[:2].var())
-    )
+    alone, whole = np.stack([indices - reach, indices + reach], axis=-1)
+    return SobolIndices(first, total, alone, whole, float(y[:2].mean()), float(y[:2].var()))
 
 
 def _jackknife(y: Array, replicate: Integers) -> Array:

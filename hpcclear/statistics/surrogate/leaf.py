@@ -29,9 +29,7 @@ def checked_samples(
     return labels, valid
 
 
-def inside(
-    points: np.ndarray, names: Sequence[str], lower: np.ndarray, upper: np.ndarray
-) -> np.ndarray:
+def inside(points: Array, names: Sequence[str], lower: Array, upper: Array) -> Array:
     """Points ``(n, d)`` as floats, after checking that none lies outside the box.
 
     Raises InputError naming the first variable and value outside.

@@ -15,9 +15,8 @@ def n_terms(n_inputs: int, order: int) -> int:
 
 def exponents_up_to(n_inputs: int, order: int) -> Integers:
     """Exponents of all terms up to a total order, shape (t, d), the constant first."""
-    chosen = (
-        c for k in range(order + 1) for c in combinations_with_replacement(range(n_inputs), k)
-    )
+    inputs = range(n_inputs)
+    chosen = (c for k in range(order + 1) for c in combinations_with_replacement(inputs, k))
     return np.array([[c.count(j) for j in range(n_inputs)] for c in chosen], dtype=np.int64)
 
 

@@ -26,9 +26,7 @@ def rows_of(
     columns = leaves[0].columns if columns is None else columns
 
     def filled(dim: str) -> dict[str, np.ndarray]:
-        return {
-            name: np.full(shapes[dim], np.nan) for name, (of, _) in columns.items() if of == dim
-        }
+        return {n: np.full(shapes[dim], np.nan) for n, (of, _) in columns.items() if of == dim}
 
     data = {"training_output": np.full(shapes["point"], np.nan)} | filled("point")
     data |= {name: np.full(shapes["point"], np.nan) for name in parameters} | filled("parameter")
@@ -81,10 +79,8 @@ def _family(arrays: Mapping[str, np.ndarray], family: str, rows: list[int]) -> P
     known = arrays["parameter"].tolist()
     if not set(family.split(" ")) <= set(known):
         raise _unfit(family)
-    leaves = tuple(
-        _leaf({name: one[row] for name, one in arrays.items() if len(one) > row}, family, known)
-        for row in rows
-    )
+    own = ({name: one[row] for name, one in arrays.items() if len(one) > row} for row in rows)
+    leaves = tuple(_leaf(one, family, known) for one in own)
     r2, rmae, accepted = (arrays[name][rows] for name in ("r2", "rmae", "accepted"))
     return Piecewise(leaves, r2, rmae, accepted.astype(bool))
 
@@ -106,9 +102,8 @@ def _leaf(one: Mapping[str, np.ndarray], family: str, known: list[str]) -> Leaf:
         for name, (dim, attribute) in columns.items()
         if name in one
     }
-    lower, upper = (
-        np.array([float(one[f"{name}_{end}"]) for name in names]) for end in ("lower", "upper")
-    )
+    ends = [[float(one[f"{name}_{end}"]) for name in names] for end in ("lower", "upper")]
+    lower, upper = np.array(ends)
     inputs = np.column_stack([one[name][:size] for name in names])
     values = one["training_output"][:size]
     if not foreign:

@@ -64,13 +64,10 @@ class Mean:
     rtol: float  # the looser of the two tolerances, the other one is `STRICTER` times tighter
     met: bool
     period: int | None = None
-    growth: float = (
-        np.nan
-    )  # of a perturbation, per revolution: mean logarithm, as far as the look showed
+    growth: float = np.nan
+    """Of a perturbation, per revolution: mean logarithm, as far as the look showed."""
     growth_limit: float = np.nan  # half-width of its confidence interval, if measured on purpose
-    attractors: int | None = (
-        None  # kinds of motion found from several starts, if they were looked for
-    )
+    attractors: int | None = None  # kinds of motion from several starts, if they were looked for
     status: Status = Status.OK
     revolutions: int = 0  # all that were simulated, and their evaluations
     evaluations: float = 0.0

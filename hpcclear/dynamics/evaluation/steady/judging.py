@@ -31,9 +31,8 @@ def objective(gaps: Array) -> Array:
 class Windows:
     """Averages over the latest revolutions of a few copies, and what they still may be off by, m."""
 
-    period: (
-        int | None
-    )  # revolutions after which every copy repeats itself, to a quarter of the target
+    period: int | None
+    """Revolutions after which every copy repeats itself, to a quarter of the target."""
     length: int  # revolutions of the later window: about half of them, whole periods
     gaps: Array  # mean gaps over it, (copies, joints)
     settling: float  # how far the average may still move if it goes on as it did

@@ -87,9 +87,8 @@ def _starts(sample: Sample) -> Start:
 
 def _shadows(start: Start, scale: Array) -> Start:
     """A copy beside each start, `DISTANCE` away."""
-    beside = [
-        perturbed(start[k : k + 1], scale, range(k + 1, k + 2), DISTANCE) for k in range(len(start))
-    ]
+    each = ((start[k : k + 1], range(k + 1, k + 2)) for k in range(len(start)))
+    beside = [perturbed(one, scale, number, DISTANCE) for one, number in each]
     return Start(np.concatenate([one.rows for one in beside]))
 
 
