@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.ranks.leading import FLUSH_INTERVAL
 from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
-from hpcclear.ranks.team import FLUSH_INTERVAL
 
 LANES = 32
 LATENCY = 5e-6  # s, network

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from hpcclear.ranks.team import FLUSH_INTERVAL
+from hpcclear.ranks.leading import FLUSH_INTERVAL
 
 UNSAVED = ("readings: simulations", "surrogate: ", "random inputs: ", "parallel: ")
 """Beginnings of the names of stages that are kept a reading or a panel of `accuracy` at a time, not by samples: a

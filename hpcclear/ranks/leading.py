@@ -1,19 +1,33 @@
-"""A design on its way through the ranks: root hands samples out and works along."""
+"""A design on its way through the ranks: root hands samples out and works along; the others request them."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 
 import numpy as np
 
-from hpcclear.ranks.mailbox import Backoff, Message, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Message, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, HandOut, Kept, PointSource, Task
+from hpcclear.ranks.schedule import (
+    COLUMNS,
+    GLANCE,
+    QUANTUM,
+    HandOut,
+    Kept,
+    Need,
+    PointSource,
+    Task,
+    Worker,
+)  # fmt: skip
 from hpcclear.ranks.stopping import RankFailed, Stopped
 from hpcclear.ranks.team import Ranks
 
 EARLY = 1.0
 """Seconds from the beginning of a stage in which the first samples are waited for."""
+
+FLUSH_INTERVAL = 1.0
+"""Seconds that a finished record waits on a rank at most."""
 
 _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
 
@@ -44,7 +58,7 @@ def run_points(
     with contextlib.closing(progress), ranks.timed(task.name) as spent:
         if not book.done:
             lead.work(task, spent)
-            ranks.queue = None
+            ranks.suspects = list
     return earlier[:0] if lead.kept is None else lead.kept.records()
 
 
@@ -70,7 +84,7 @@ class Lead:
         """
         self._spent = spent
         self._ranks.raise_if_stopped()
-        self._mail.notify_others(Tag.STAGE, task)
+        self._mail.notify_others(Tag.STAGE, (task, take_part))
         try:
             self._hand_out(task)
         except BaseException as error:
@@ -81,7 +95,7 @@ class Lead:
 
     def _hand_out(self, task: Task) -> None:
         """Answer the others, and work along for a moment at a time, until every sample is finished."""
-        queue, self._spent[0, _COMPILE] = self._ranks.make_queue(task)
+        queue, self._spent[0, _COMPILE] = queue_of(self._ranks, task)
         backoff = Backoff()
         while not self.book.done:
             while (message := self._mail.poll()) is not None:
@@ -154,3 +168,115 @@ class Lead:
                 self.save()
         if not self._failed:
             self.progress.add(records)
+
+
+def take_part(ranks: Ranks, task: Task) -> None:
+    """Another rank's part in a stage: request samples before the last ones are done, send records along, until root ends it."""
+    queue, setup = queue_of(ranks, task)
+    asked, sent_at, backoff = False, time.monotonic(), Backoff()
+    while (message := ranks.mail.poll()) is None or message.tag != Tag.END:
+        ranks.pass_on_stop()
+        if message is not None:
+            if message.tag == Tag.LEAVE:
+                raise Leave(message.body)
+            queue.take(*message.body)
+            asked = False
+            backoff.reset()
+        overdue = queue.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
+        if queue.hungry and not asked:
+            ranks.mail.send(0, Tag.ASK, (ranks.outbox(), queue.need))
+            asked, sent_at = True, time.monotonic()
+        elif ranks.unsent and overdue:
+            ranks.mail.send(0, Tag.RECORDS, ranks.outbox())
+            sent_at = time.monotonic()
+        if queue.idle:
+            backoff.wait()
+        else:
+            ranks.unsent.append(queue.work(GLANCE if queue.soon_hungry else QUANTUM))
+    ranks.mail.send(0, Tag.DONE, (ranks.outbox(), (queue.busy, setup)))
+
+
+def queue_of(ranks: Ranks, task: Task) -> tuple["WorkQueue", float]:
+    """The queue of this rank's worker, and the seconds it took to make that."""
+    started = time.perf_counter()
+    recent = ranks.pace_of(task)
+    queue = WorkQueue(task.make(task.payload, ranks), recent=recent)
+    queue.exhausted = ranks.rank >= (ranks.size if task.workers is None else task.workers)
+    ranks.suspects = queue.suspects
+    return queue, time.perf_counter() - started
+
+
+class WorkQueue:
+    """One rank's samples in hand: feeds the worker, knows its stock, its speed and its busy time.
+
+    `recent`: finished samples and busy seconds (2,), the older the less weight, of such a worker before; kept up.
+    """
+
+    def __init__(
+        self, worker: Worker, clock: Callable[[], float] = time.perf_counter, recent: np.ndarray | None = None
+    ) -> None:  # fmt: skip
+        self._worker = worker
+        self._clock = clock
+        self._in_hand: set[int] = set()
+        self._recent = np.zeros(2) if recent is None else recent
+        self._ask_below = 1
+        self._inside = False
+        self.busy = 0.0
+        self.exhausted = False
+
+    @property
+    def need(self) -> Need:
+        """What to report to root."""
+        finished, seconds = self._recent
+        rate = float(finished / seconds) if seconds > 0.0 else 0.0
+        return Need(self._worker.lanes, self._worker.pending, rate)
+
+    @property
+    def hungry(self) -> bool:
+        """Whether it is time to request more."""
+        return not self.exhausted and self._worker.pending < self._ask_below
+
+    @property
+    def soon_hungry(self) -> bool:
+        """Whether it may be, within the next `QUANTUM`."""
+        need = self.need
+        return not self.exhausted and need.pending < self._ask_below + 2.0 * QUANTUM * need.rate
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing to work on."""
+        return self._worker.pending == 0
+
+    def suspects(self) -> list[int]:
+        """Samples in hand, ascending, if the worker raised an exception; else none."""
+        return sorted(self._in_hand) if self._inside else []
+
+    def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
+        """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""
+        self._ask_below = ask_below
+        if index.size == 0:
+            self.exhausted = True
+            return
+        self._in_hand.update(index.tolist())
+        self._inside = True
+        self._worker.submit(index, points)
+        self._inside = False
+
+    def work(self, seconds: float = QUANTUM) -> np.ndarray:
+        """Let the worker advance; return the records it finished.
+
+        Raises RuntimeError if the worker returns a sample that it was not given, or had returned before.
+        """
+        started = self._clock()
+        self._inside = True
+        records = self._worker.advance(seconds)
+        self._inside = False
+        spent = self._clock() - started
+        self.busy += spent
+        self._recent *= math.exp(-spent / 2.0)  # costs change over a design: two seconds of memory
+        self._recent += records.size, spent
+        for sample in records["sample"].tolist():
+            if sample not in self._in_hand:
+                raise RuntimeError(f"the worker returned sample {sample}, which it does not have")
+            self._in_hand.remove(sample)
+        return records

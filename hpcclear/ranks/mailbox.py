@@ -29,7 +29,7 @@ class Leave(BaseException):
 class Tag(IntEnum):
     """What a message says; the first five come from root."""
 
-    STAGE = 1  # a stage begins: its task
+    STAGE = 1  # a stage begins: (task, function by which a rank takes part)
     CALL = 2  # do this once: (name, function, payload)
     BLOCK = 3  # samples: (index, points, ask_below)
     END = 4  # the stage is over, drop what is unfinished

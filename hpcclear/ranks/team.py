@@ -1,4 +1,4 @@
-"""The processes of a job at work: root hands out samples and collects records, stage after stage.
+"""The processes of a job at work, stage after stage; `hpcclear.ranks.leading` has those that simulate.
 
 The other ranks wait for root's stages and work on what it hands out. Root works too, and looks into
 its mailbox between short quanta of its own work. No rank ever blocks inside MPI: every wait is a
@@ -15,11 +15,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
-from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task, WorkQueue
+from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
-
-FLUSH_INTERVAL = 1.0
-"""Seconds that a finished record waits on a rank at most."""
 
 Call = Callable[[Any, "Ranks"], object]
 """What each rank does once, with a payload."""
@@ -29,15 +26,16 @@ class Ranks:
     """The processes of one job. Made by `run_on_ranks`, or by `alone` for one process; `is_root`: this one runs the program.
 
     `stage_seconds`: on root, seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`; every row of a
-    stage adds up to its wall time. `queue`: the samples in hand, if there are some.
+    stage adds up to its wall time. `suspects`: returns the samples that a worker's error may be of (`WorkQueue`); `unsent`:
+    finished records that root has not got.
     """
 
     def __init__(self, mail: Mail, stop: StopSwitch) -> None:
         self.mail = mail
         self.stop_switch = stop
         self._stage = "start"
-        self.queue: WorkQueue | None = None
-        self._unsent: list[np.ndarray] = []
+        self.suspects: Callable[[], list[int]] = list
+        self.unsent: list[np.ndarray] = []
         self._writing = 0.0  # seconds of output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
@@ -61,7 +59,7 @@ class Ranks:
     @property
     def where(self) -> str:
         """Rank, stage and, after an error of the worker, its samples: for reports."""
-        samples = [] if self.queue is None else self.queue.suspects
+        samples = self.suspects()
         shown = ", ".join(map(str, samples[:8])) + (", ..." if len(samples) > 8 else "")
         place = f"rank {self.rank} of {self.size} in stage '{self._stage}'"
         if len(samples) > 1:
@@ -144,16 +142,12 @@ class Ranks:
         elif message.tag == Tag.ERROR:
             raise RankFailed(*message.body[:2])
 
-    def make_queue(self, task: Task) -> tuple[WorkQueue, float]:
-        """This rank's worker, and the seconds it took to make it."""
-        started = time.perf_counter()
+    def pace_of(self, task: Task) -> np.ndarray:
+        """Pace of this rank's worker (`WorkQueue.recent`): of a stage like the last one it is known how long samples take."""
         mark = pickle.dumps((task.make, task.payload)) if self.size > 1 else b""
-        if mark != self._known:  # of a stage like the last one it is known how long samples take
+        if mark != self._known:
             self._known, self._recent = mark, np.zeros(2)
-        self.queue = WorkQueue(task.make(task.payload, self), recent=self._recent)
-        working = self.size if task.workers is None else task.workers
-        self.queue.exhausted = self.rank >= working
-        return self.queue, time.perf_counter() - started
+        return self._recent
 
     def serve(self, ahead: Sequence[str] = ()) -> NoReturn:
         """Work for root, stage after stage, until it says to leave; load the modules `ahead` while it says nothing yet."""
@@ -168,44 +162,20 @@ class Ranks:
             elif message.tag == Tag.LEAVE:
                 raise Leave(message.body)
             elif message.tag == Tag.STAGE:
-                self._stage = message.body.name
-                self._serve_stage(message.body)
-                self.queue = None
+                task, take_part = message.body
+                self._stage = task.name
+                take_part(self, task)
+                self.suspects = list
                 backoff.reset()
             elif message.tag == Tag.CALL:
                 self._stage, function, payload = message.body
                 self.mail.send(0, Tag.DONE, (None, (0.0, self._call(function, payload))))
                 backoff.reset()
 
-    def _serve_stage(self, task: Task) -> None:
-        """Request samples before the last ones are done, send records along, until root ends the stage."""
-        queue, setup = self.make_queue(task)
-        asked, sent_at, backoff = False, time.monotonic(), Backoff()
-        while (message := self.mail.poll()) is None or message.tag != Tag.END:
-            self.pass_on_stop()
-            if message is not None:
-                if message.tag == Tag.LEAVE:
-                    raise Leave(message.body)
-                queue.take(*message.body)
-                asked = False
-                backoff.reset()
-            overdue = queue.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
-            if queue.hungry and not asked:
-                self.mail.send(0, Tag.ASK, (self.outbox(), queue.need))
-                asked, sent_at = True, time.monotonic()
-            elif self._unsent and overdue:
-                self.mail.send(0, Tag.RECORDS, self.outbox())
-                sent_at = time.monotonic()
-            if queue.idle:
-                backoff.wait()
-            else:
-                self._unsent.append(queue.work(GLANCE if queue.soon_hungry else QUANTUM))
-        self.mail.send(0, Tag.DONE, (self.outbox(), (queue.busy, setup)))
-
     def outbox(self) -> np.ndarray | None:
         """Finished records that root has not got yet; empties the box."""
-        records = np.concatenate(self._unsent) if self._unsent else None
-        self._unsent.clear()
+        records = np.concatenate(self.unsent) if self.unsent else None
+        self.unsent.clear()
         return records
 
     def pass_on_stop(self) -> None:
