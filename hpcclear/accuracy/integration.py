@@ -13,7 +13,7 @@ from hpcclear.accuracy.looked_at import QUANTITIES, quantities_of
 from hpcclear.accuracy.methods import kernel_method, methods_of, solve_turn, systems, timed
 from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array
-from hpcclear.report.html.costs import MARGIN
+from hpcclear.report.targets import MARGIN
 from hpcclear.scene import Scene
 
 REFERENCE_RTOL = 1e-13

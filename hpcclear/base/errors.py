@@ -194,9 +194,8 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
     for one in chain:
         number = one.errno if isinstance(one, OSError) else None
         if number in _NO_HANDLES:
-            return LimitError(
-                "too few file handles. Raise the limit (ulimit -n), then run the same command again"
-            )
+            remedy = "Raise the limit (ulimit -n), then run the same command again"
+            return LimitError(f"too few file handles. {remedy}")
         if isinstance(one, OSError) and number in _BAD_NAMES and one.filename is not None:
             name = one.filename
             name = os.fsdecode(name) if isinstance(name, bytes) else str(name)
@@ -215,9 +214,8 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
 
 def _out_of_memory(why: str) -> LimitError:
     known = f" ({why})" if why else ""
-    return LimitError(
-        f"out of memory{known}. Give the job more memory, or fewer ranks a node, and run the same command again"
-    )
+    remedy = "Give the job more memory, or fewer ranks a node, and run the same command again"
+    return LimitError(f"out of memory{known}. {remedy}")
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

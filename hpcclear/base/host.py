@@ -28,9 +28,8 @@ def flags(*names: str) -> int:
     return int(found)
 
 
-STOP_SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGUSR1") if hasattr(signal, name)
-)
+_STOPS = ("SIGTERM", "SIGINT", "SIGUSR1")
+STOP_SIGNALS = tuple(getattr(signal, name) for name in _STOPS if hasattr(signal, name))
 """What batch systems and people send to end a job."""
 
 

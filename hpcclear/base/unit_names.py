@@ -102,9 +102,8 @@ OTHERS: dict[str, Unit] = {name: unit for names, unit in _FURTHER.items() for na
 OTHERS |= _prefixed({"p": -12, "T": 12}, ("pbar", "Tm", "Tg"))
 _KNOWN = UNITS | OTHERS
 for _prefix, _short in _LONG.items():
-    OTHERS |= {
-        _prefix + one: _KNOWN[_short + of] for one, of in _WORDS.items() if _short + of in _KNOWN
-    }
+    _spelt = {_prefix + one: _short + of for one, of in _WORDS.items()}
+    OTHERS |= {one: _KNOWN[short] for one, short in _spelt.items() if short in _KNOWN}
 _PLURAL = [name for name in OTHERS if len(name) > 3 and name[-1] not in "szH"]
 OTHERS |= {f"{name}s": OTHERS[name] for name in _PLURAL}
 """Units that are read besides: the SI's in full words, and those of other systems."""

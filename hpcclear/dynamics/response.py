@@ -112,9 +112,8 @@ def simulate_together(
             continue
         first, *others = (scenes[k] for k in numbers)
         recording = steps.Recording(first, [copies[k] for k in numbers], beside=others)
-        collected = [
-            Collected(scenes[k], one) for k, one in zip(numbers, recording.samples, strict=True)
-        ]
+        own = zip(numbers, recording.samples, strict=True)
+        collected = [Collected(scenes[k], one) for k, one in own]
         for rows in recording.chunks():
             for slot, one in enumerate(collected):
                 one.take(rows[rows[:, rec.SLOT] == slot])
@@ -234,9 +233,8 @@ def _prescribed(scene: Scene) -> Found:
     lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = evaluator.outcome_records(
-        *lanes.collect(), record_of(scene), evaluator.responses_reported(problem)
-    )
+    reported = evaluator.responses_reported(problem)
+    record = evaluator.outcome_records(*lanes.collect(), record_of(scene), reported)
     times, data = prescribed_series(scene, problem.transient + problem.averaged)
     first = problem.transient + problem.averaged - kept_revolutions(scene)
     kept = times >= (first - 1e-9) * mechanism_of(scene.linkage).period.seconds

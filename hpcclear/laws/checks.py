@@ -165,9 +165,7 @@ def unit_of(unit: str, name: str) -> Quantity:
     try:
         for _, (size, own), power in parts(unit) if unit else ():
             known = _NAMED.get(frozenset(own.items()))
-            powers = (
-                {base: float(one) for base, one in own.items()} if known is None else {known: 1.0}
-            )
+            powers = {known: 1.0} if known else {base: float(one) for base, one in own.items()}
             scale = size if known is None else size / 1000
             one = registry().Quantity(float(scale), registry().UnitsContainer(powers))
             made = made * one ** float(power)
@@ -233,10 +231,8 @@ def _in_unit(law: Law, found: Quantity, title: str, unit: str) -> Quantity:
         if len(law.worked_out()) == 1:
             missing |= law.numbers.keys() - found.keys()
         if missing:
-            raise LawError(
-                f"once returns {', '.join(found)}, but numbers declares {', '.join(law.numbers) or 'none'}",
-                "Declare each with its unit: numbers={...}",
-            )
+            reason = f"once returns {', '.join(found)}, but numbers declares {', '.join(law.numbers) or 'none'}"
+            raise LawError(reason, "Declare each with its unit: numbers={...}")
         return {
             name: _in_unit(law, value, f"{title}: {name}", law.numbers[name])
             for name, value in found.items()

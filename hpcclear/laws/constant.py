@@ -39,10 +39,9 @@ def with_constants(law: Own) -> Own:
     if kinks:
         changed["kinks"] = tuple(changed.pop(k, made[k].own) for k in kinks)
     once = [one.once() for one in made.values() if one.constants]
-    numbers = {name: "" for one in made.values() for name in one.constants.values()}
-    found = replace(
-        law, **changed, once=(*law.worked_out(), *once), numbers={**law.numbers, **numbers}
-    )
+    changed["once"] = (*law.worked_out(), *once)
+    further = {name: "" for one in made.values() for name in one.constants.values()}
+    found = replace(law, **changed, numbers={**law.numbers, **further})
     return found if len(found.read) <= LAW_NUMBERS else law
 
 

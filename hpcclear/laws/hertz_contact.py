@@ -21,9 +21,8 @@ def dundurs(moduli: Sequence[Array], ratios: Sequence[Array]) -> tuple[Array, Ar
     Dundurs 1969, doi:10.1115/1.3564739.
     """
     h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
-    g_bearing, g_journal = (
-        (1.0 - 2.0 * nu) * (1.0 + nu) / modulus for modulus, nu in zip(moduli, ratios, strict=True)
-    )
+    both = zip(moduli, ratios, strict=True)
+    g_bearing, g_journal = ((1.0 - 2.0 * nu) * (1.0 + nu) / modulus for modulus, nu in both)
     total = h_bearing + h_journal
     return (h_bearing - h_journal) / total, 0.5 * (g_bearing - g_journal) / total
 

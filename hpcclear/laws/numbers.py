@@ -35,11 +35,10 @@ def with_words(
     code = function.__code__
     for name in code.co_names:
         value = names.get(name)
+        known = value is None or getattr(value, "__module__", "") in ("math", "numpy")
         if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
             made[name] = SimpleNamespace(**{**vars(value), **words})
-        elif name in words and (
-            value is None or getattr(value, "__module__", "") in ("math", "numpy")
-        ):
+        elif name in words and known:
             made[name] = words[name]
         elif isinstance(value, FunctionType) and value is not function:
             made[name] = with_words(value, words, own)

@@ -63,10 +63,8 @@ def check_objective(objective: Objective) -> None:
         raise LawError("has neither a rate nor a value", "Declare one of them, or both")
     if objective.made not in MADE:
         raise LawError(f"made is {objective.made!r}", f"Use one of: {', '.join(MADE)}")
-    given = {
-        "rate": OF_JOINTS | OF_ALL,
-        "value": RECORDED | ({"rate": ""} if objective.rate else {}),
-    }
+    of_value = RECORDED | ({"rate": ""} if objective.rate else {})
+    given = {"rate": OF_JOINTS | OF_ALL, "value": of_value}
     for title, known in given.items():
         function = getattr(objective, title)
         for name in () if function is None else arguments(function):
@@ -85,17 +83,13 @@ def _check_rate(objective: Objective) -> None:
     """LawError unless the rate is finite, in flight as well, and what is made of it has its unit."""
     between = np.linspace(0.0, 1.0, 7)
     shares = np.array(np.meshgrid(between, between)).reshape(2, -1)
-    given = {
-        name: low + (high - low) * shares[k % 2]
-        for k, (name, (_, low, high)) in enumerate(_READ.items())
-    }
+    rows = enumerate(_READ.items())
+    given = {name: low + (high - low) * shares[k % 2] for k, (name, (_, low, high)) in rows}
     assert objective.rate is not None
     found = np.asarray(evaluate(objective.rate, given), float)
     if not np.isfinite(found).all():
-        raise LawError(
-            "its rate is not finite everywhere: in flight depth and forces are 0, at rest speeds are",
-            "Mend the formula",
-        )
+        reason = "its rate is not finite everywhere: in flight depth and forces are 0, at rest speeds are"
+        raise LawError(reason, "Mend the formula")
     units = OF_JOINTS | OF_ALL
     quantities = {name: registry().Quantity(0.1, units[name]) for name in arguments(objective.rate)}
     made = _with_unit(objective.rate, quantities, "rate")

@@ -40,9 +40,8 @@ def text_of(law: Law) -> str:
     for name, function in functions.items():
         parts += written(function, f"own_{name}", f"{law.name}.{name}")
     for name, formula in (_contact if isinstance(law, ContactLaw) else _friction)(law).items():
-        parts.append(
-            f"@lane_function\ndef joint_{name}({_SIGNATURES[law.kind]}):\n    return {formula}\n"
-        )
+        head = f"@lane_function\ndef joint_{name}({_SIGNATURES[law.kind]}):"
+        parts.append(f"{head}\n    return {formula}\n")
     return "\n\n".join(parts)
 
 
@@ -59,14 +58,10 @@ def _contact(law: Law) -> dict[str, str]:
     if "factor" in functions:
         elastic, kink = _call(law, "elastic"), _call(law, "factor")
         return {"force": f"no_less({elastic} * {kink}, 0.0)", "elastic": elastic, "kink": kink}
-    at_rest = _call(law, "force", rate="0.0")
+    force, at_rest = _call(law, "force"), _call(law, "force", rate="0.0")
     elastic = _call(law, "elastic") if "elastic" in functions else at_rest
-    kink = f"{_call(law, 'force')} / ({elastic} + 1e-300)"
-    return {
-        "force": f"no_less({_call(law, 'force')}, 0.0)",
-        "elastic": elastic,
-        "kink": _call(law, "kink") if "kink" in functions else kink,
-    }
+    kink = _call(law, "kink") if "kink" in functions else f"{force} / ({elastic} + 1e-300)"
+    return {"force": f"no_less({force}, 0.0)", "elastic": elastic, "kink": kink}
 
 
 def _friction(law: Law) -> dict[str, str]:

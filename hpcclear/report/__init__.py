@@ -15,10 +15,8 @@ from hpcclear.report import figures
 
 @cache
 def _public() -> dict[str, Any]:
-    modules = [
-        import_module(f"{figures.__name__}.{m.name}")
-        for m in pkgutil.iter_modules(figures.__path__)
-    ]
+    names = [module.name for module in pkgutil.iter_modules(figures.__path__)]
+    modules = [import_module(f"{figures.__name__}.{name}") for name in names]
     named = [(name, one) for module in modules for name, one in vars(module).items()]
     return {name: one for name, one in named if _is_public(name)}
 

@@ -12,9 +12,11 @@ from hpcclear.results.content import Results
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Relative errors of f that are put in words."""
 
+MARGIN = 100.0
+"""The reference must be this many times better than what is measured against it; smaller errors are not resolved."""
+
 REPLICAS = 32
 """Of a mean over replicas; each has a transient of its own."""
-
 
 DOUBLINGS = 21
 """Of the 10 revolutions of the shortest mean over replicas: up to ten millions."""

@@ -346,23 +346,17 @@ def reached(run: StudyRun, true: Result, table: verification.NamedDesigns) -> tu
         lower = "numerics.target_error"
         if run.scene.numerics.target_error is None:
             lower = f"numerics.rtol, to {run.scene.numerics.rtol / 10.0**tenths:.0e} say"
-        remarks.append(
-            f"The integration tolerance dominates: it contributes {_percents(share)}{target}. Lower {lower}."
-        )
+        much = f"it contributes {_percents(share)}{target}"
+        remarks.append(f"The integration tolerance dominates: {much}. Lower {lower}.")
     elif run.study.paired and (doubt > 2.0 * HIDDEN * wanted).any():
-        remarks.append(
-            f"Chaotic motion hides the error of the integration tolerance: its standard error is {_percents(doubt)}."
-        )
+        hidden = "Chaotic motion hides the error of the integration tolerance"
+        remarks.append(f"{hidden}: its standard error is {_percents(doubt)}.")
     texts = verification.short_of_accuracy(run, table, true)
-    missed = [
-        f"{one.name}: {text}"
-        for one, text, best in zip(table.choices, texts, table.recommended, strict=True)
-        if text and best
-    ]
+    rows = zip(table.choices, texts, table.recommended, strict=True)
+    missed = "; ".join(f"{one.name}: {text}" for one, text, best in rows if text and best)
     if run.study.paired and missed and not dominates:
-        remarks.append(
-            f"The accuracy requested was not reached by {'; '.join(missed)}. Raise study.verification.most_samples."
-        )
+        short = f"The accuracy requested was not reached by {missed}"
+        remarks.append(f"{short}. Raise study.verification.most_samples.")
     return text, remarks
 
 

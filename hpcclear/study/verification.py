@@ -29,11 +29,11 @@ ROUND_OFF = 1.0001
 
 def original(run: StudyRun) -> list[Choice]:
     """The design in the scene file, in each case."""
-    designs = {
-        case.name: {n: run.scene.baseline(n) for n in run.study.design_variables(case.name)}
-        for case in run.study.cases
-    }
-    return [Choice(f"{name} original", name, one, None, "given") for name, one in designs.items()]
+    found = []
+    for name in (case.name for case in run.study.cases):
+        design = {n: run.scene.baseline(n) for n in run.study.design_variables(name)}
+        found += [Choice(f"{name} original", name, design, None, "given")]
+    return found
 
 
 def predicted(run: StudyRun, choices: Sequence[Choice], model: Piecewise) -> Array:
@@ -78,9 +78,8 @@ def undecided(run: StudyRun, choices: Sequence[Choice], true: Result) -> list[st
             won = f"{(kept - value) / (abs(kept) or 1.0):.2g}"
             words, price = goal.words(run.scene.objective.unit), np.nanmax(true["price"][row])
             needs = f"; about {price:.0f} simulations would decide" if np.isfinite(price) else ""
-            texts.append(
-                f"{choices[row].name} is undecided and would lower the {words} by {won} of its value{needs}."
-            )
+            would = f"would lower the {words} by {won} of its value{needs}"
+            texts.append(f"{choices[row].name} is undecided and {would}.")
     return texts
 
 
@@ -280,9 +279,9 @@ def write(
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)
     used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]
-    data: dict[str, np.ndarray] = {
-        name: np.array([choice.design.get(name, np.nan) for choice in choices]) for name in used
-    }
+    data: dict[str, np.ndarray] = {}
+    for name in used:
+        data[name] = np.array([choice.design.get(name, np.nan) for choice in choices])
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]

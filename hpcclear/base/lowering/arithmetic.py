@@ -53,10 +53,8 @@ class Arithmetic:
         module = self.builder.module
         place = ir.GlobalVariable(module, content.type, module.get_unique_name("constant"))
         place.initializer, place.global_constant, place.linkage = content, True, "internal"
-        return Array(
-            self.builder.gep(place, [val.whole(0), val.whole(0)]),
-            tuple(map(val.whole, known.shape)),
-        )
+        first = self.builder.gep(place, [val.whole(0), val.whole(0)])
+        return Array(first, tuple(map(val.whole, known.shape)))
 
     def cast(self, value: Value, kind: ir.Type) -> Value:
         """A number as one of a type that holds it."""

@@ -72,9 +72,8 @@ class _Program:
             key = other, kinds, frozenset(fast)
             if key not in self.known:
                 own = f"{self.name}.{other.__name__}.{len(self.known)}"
-                self.known[key] = self.code(
-                    other, kinds, fast, own, options.get("forceinline", False)
-                )
+                within = options.get("forceinline", False)
+                self.known[key] = self.code(other, kinds, fast, own, within)
             found = self.known[key]
             called[found.name] = found
             return found.name, found.result

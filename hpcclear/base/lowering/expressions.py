@@ -6,7 +6,7 @@ A value is LLVM's, or one of Python's that is known: a number, a function, an ef
 import ast
 import math
 from collections.abc import Callable
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 from llvmlite import ir
@@ -93,24 +93,21 @@ class Expressions(Arithmetic):
             found = self.expression(node.values[k])
             if k + 1 == len(node.values):
                 return found
-            ways = (lambda: link(k + 1)), (lambda: found)
-            return self.either(
-                self.truth(found), *(ways if isinstance(node.op, ast.And) else ways[::-1])
-            )
+            further, done = (lambda: link(k + 1)), (lambda: found)
+            ways = (further, done) if isinstance(node.op, ast.And) else (done, further)
+            return self.either(self.truth(found), *ways)
 
         return link(0)
 
     def _of_IfExp(self, node: ast.IfExp) -> Value:
         test = self.truth(self.expression(node.test))
-        if not val.is_known(test) and all(
-            isinstance(one, _AT_HAND) for one in (node.body, node.orelse)
-        ):
-            chosen = [self.expression(one) for one in (node.body, node.orelse)]
+        ways = node.body, node.orelse
+        if not val.is_known(test) and all(isinstance(one, _AT_HAND) for one in ways):
+            chosen = [self.expression(one) for one in ways]
             if all(isinstance(one, float | int | ir.Value) for one in chosen):
                 return self.selected(test, *chosen)
-        return self.either(
-            test, lambda: self.expression(node.body), lambda: self.expression(node.orelse)
-        )
+        yes, no = (partial(self.expression, one) for one in ways)
+        return self.either(test, yes, no)
 
     def selected(self, test: Value, yes: Value, no: Value) -> Value:
         """One of two numbers at hand. Into a branch the compiler may move their loads, and vectorises no loop around it."""

@@ -93,9 +93,8 @@ class ContactWriter(Touching):
     def __init__(self, closing: Closing, k: int, contact: Contact, apart: Vector) -> None:
         self._closing, self._contact, self.apart = closing, contact, apart
         rows = at.CLEARANCE, at.BEARING_RADIUS, at.JOURNAL_RADIUS
-        self.clearance, self.bearing_radius, self.journal_radius = (
-            named(f"par[(joints[{k}].block + {row}) * W + i]") for row in rows
-        )
+        numbers = [named(f"par[(joints[{k}].block + {row}) * W + i]") for row in rows]
+        self.clearance, self.bearing_radius, self.journal_radius = numbers
 
     @property
     def across(self) -> Vector:

@@ -181,9 +181,8 @@ class Closing:
             apart = self.writer.let(f"apart_{drive.name}", error)
             names = (f"s_{name}", f"c_{name}")
             error, _ = self.writer.when_needed(f"sincos({apart.name})", *names)
-        return self._row(
-            f"{drive.name}_angle", {Mover("angle", own): ONE}, -turn, kin.spin(own) - spin, error
-        )
+        rate = kin.spin(own) - spin
+        return self._row(f"{drive.name}_angle", {Mover("angle", own): ONE}, -turn, rate, error)
 
 
 def dot(a: Vector, b: Vector) -> Term:

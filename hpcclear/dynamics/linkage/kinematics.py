@@ -285,11 +285,8 @@ class Kinematics:
 
     def columns(self, point: Point) -> dict[Mover, tuple[str, Vector]]:
         """Derivatives of a point by all that moves it: frame, and vector in it."""
-        found = {
-            Mover("angle", frame): (frame, arm.across())
-            for frame, arm in point.arms.items()
-            if frame != GROUND and self.forest.turning(frame)
-        }
+        arms = [(f, arm) for f, arm in point.arms.items() if f != GROUND and self.forest.turning(f)]
+        found = {Mover("angle", frame): (frame, arm.across()) for frame, arm in arms}
         return found | {Mover(m.kind, m.body): (m.frame, m.direction) for m in point.moves}
 
 

@@ -165,9 +165,8 @@ def _places(m: Mechanism) -> None:
     for joint in m.joints:
         first, second = (parts.split(place)[0] for place in parts.places_of(joint))
         if first == second:
-            raise InputError(
-                f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
-            )
+            reason, remedy = "joins a body to itself", "Name two bodies"
+            raise InputError(f"joints.{joint.name}", first, reason, remedy)
         if joint.kind == "fixed" and second != GROUND:
             reason = "a body can be fixed to the ground only"
             remedy = "Name a point of the ground, or make one body of the two"
@@ -274,11 +273,8 @@ def massless_angles(m: Mechanism) -> set[str]:
 
 def turning(m: Mechanism, held_by: tuple[str, ...] | None = None) -> set[str]:
     """Names of bodies whose angle is neither prescribed, or prescribed by such drives, nor that of the ground."""
-    held = {
-        drive.body
-        for drive in m.drives
-        if (drive.prescribed if held_by is None else drive.kind in held_by)
-    }
+    by = [d for d in m.drives if (d.prescribed if held_by is None else d.kind in held_by)]
+    held = {drive.body for drive in by}
     still: set[str] = set()
     for group in joined(m, ("slide", "fixed")):
         if GROUND in group or group & held:

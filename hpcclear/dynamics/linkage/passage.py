@@ -180,10 +180,8 @@ class _Walker:
             span = right.time - left.time
             zero = _zero(partial(self._determinant, left, right, span))
             time = left.time + zero * span
-            one, two = (
-                self.pose(self._along(left, right, (time + side - left.time) / span), time + side)
-                for side in (-reach, reach)
-            )
+            sides = [(t, (t - left.time) / span) for t in (time - reach, time + reach)]
+            one, two = (self.pose(self._along(left, right, share), t) for t, share in sides)
             if one is None or two is None or one.determinant * two.determinant >= 0.0:
                 return None
             near = left, right = one, two
@@ -322,9 +320,8 @@ def clear(loops: Loops, start: Array, seconds: Array, turns: int) -> Booleans:
         best, worst = np.maximum(best, size), np.minimum(worst, size)
         good &= np.abs(change).max(axis=0, initial=0.0) < FARTHEST
         if k:
-            good &= (signs == sign) & (
-                np.abs((new - v) * h / scales).max(axis=0, initial=0.0) < TURNED
-            )
+            turned = np.abs((new - v) * h / scales).max(axis=0, initial=0.0)
+            good &= (signs == sign) & (turned < TURNED)
         # what is off already must not spoil the arithmetic of the others
         q = np.where(good, guess - scales * change, start)
         first = first if k else q

@@ -79,9 +79,8 @@ class Poses:
         self._evaluate(work, par.T, out)
         rows = np.array([np.broadcast_to(one, count) for one in out])
         bodies = self.forest.mechanism.bodies
-        x, y, vx, vy, angle, spin = (
-            rows[: 6 * len(bodies)].reshape(len(bodies), 6, count).swapaxes(0, 1)
-        )
+        of_bodies = rows[: 6 * len(bodies)].reshape(len(bodies), 6, count)
+        x, y, vx, vy, angle, spin = of_bodies.swapaxes(0, 1)
         offsets = np.array([self.forest.offsets[body.name] for body in bodies])
         eccentricity = rows[6 * len(bodies) :].reshape(-1, 2, count)
         return Pose(x, y, angle + offsets[:, None], vx, vy, spin), eccentricity

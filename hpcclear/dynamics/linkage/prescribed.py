@@ -142,10 +142,8 @@ def why(assembly: Assembly, passage: Passage) -> str:
     pose = pose_at(assembly, passage, node)
     jacobian = loops.scaled(loops.at(pose.q, pose.v, node.time).jacobian)
     left = np.linalg.svd(jacobian)[0][:, -1]  # the forces that hold one another
-    held = {
-        joint.name: float(np.linalg.norm(left[np.array(loops.owners) == f"joints.{joint.name}"]))
-        for joint in mechanism.joints
-    }
+    owners, names = np.array(loops.owners), [joint.name for joint in mechanism.joints]
+    held = {name: float(np.linalg.norm(left[owners == f"joints.{name}"])) for name in names}
     driven = {drive.body for drive in mechanism.drives} | {GROUND}
     loaded = [j for j in mechanism.joints if held[j.name] > 0.05 * max(held.values())]
     ends = [{split(place)[0] for place in places_of(joint)} for joint in loaded]

@@ -82,9 +82,8 @@ class Rubbing:
     def pushes(self, found: dict[int, Term]) -> list[Term]:
         """Components of the reaction where unknowns are these."""
         name = f"push_{self.joint.name}"
-        return [
-            self.writer.let(name, _along(slopes, found, rest)) for rest, slopes in self.reaction
-        ]
+        parts = (_along(slopes, found, rest) for rest, slopes in self.reaction)
+        return [self.writer.let(name, part) for part in parts]
 
     def changes(self, by: dict[int, Term]) -> list[Term]:
         """What the components gain with the unknowns, `by` of each."""

@@ -57,10 +57,8 @@ def stored_energy(
     law = with_constants(table.declared)
     depth = np.maximum(gaps, 0.0)
     on = active if law.latched else np.ones_like(depth)
-    each = on * numbers.stored(
-        law, depth, numbers.read_from(law, Parameters(par).contact_numbers[..., places, :])
-    )
-    return each.sum(axis=-1)
+    read = numbers.read_from(law, Parameters(par).contact_numbers[..., places, :])
+    return (on * numbers.stored(law, depth, read)).sum(axis=-1)
 
 
 def _depth(

@@ -272,10 +272,8 @@ def varies_geometry(scene: Scene) -> bool:
 
 def scene_of(scene: Scene, points: Points, row: int) -> Scene:
     """The scene of one sample."""
-    changes = {
-        path: float(points.values[row, k]) for k, paths in enumerate(points.paths) for path in paths
-    }
-    return scene.with_(changes)
+    columns = zip(points.paths, points.values[row].tolist(), strict=True)
+    return scene.with_({path: value for paths, value in columns for path in paths})
 
 
 def put_together(mechanism: Mechanism) -> Assembly:

@@ -160,12 +160,8 @@ def first_passed(
             "clearance": seen.local, "peak_contact_force": seen.peak, "objective": seen.objective[:, None],
             THROUGH: seen.local / (DEEPEST * joints.bearing_radius),
         }  # fmt: skip
-        passed = [
-            (_crossing(fine, column, limit), name)
-            for name, limit in bounds.items()
-            for column in values[name].T
-        ]
-        cycle, name = min(passed)
+        curves = [(name, column) for name in bounds for column in values[name].T]
+        cycle, name = min((_crossing(fine, curve, bounds[name]), name) for name, curve in curves)
         if math.isfinite(cycle):
             return cycle, name
     return math.inf, ""

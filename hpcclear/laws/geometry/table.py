@@ -4,6 +4,7 @@ A monotone cubic lies between the rows (Fritsch and Butland 1984, doi:10.1137/09
 numbers are written into the function, so that lanes evaluate it without a branch: each row adds its part of the depth.
 """
 
+import itertools
 from functools import lru_cache
 
 import numpy as np
@@ -52,15 +53,10 @@ def _cubics(depths: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, float]:
 
 def _parts(depths: np.ndarray) -> list[str]:
     """Lines that give the parts of the depth between rows, ``s0`` and so on, and that behind the last, ``beyond``."""
-    lines = [
-        f"    s{k} = min(max(x - {low!r}, 0.0), {high - low!r})"
-        for k, (low, high) in enumerate(zip(depths.tolist(), depths[1:].tolist(), strict=False))
-    ]
-    return [
-        "    x = depth / depth_scale",
-        *lines,
-        f"    beyond = max(x - {depths[-1].item()!r}, 0.0)",
-    ]
+    lines = ["    x = depth / depth_scale"]
+    for k, (low, high) in enumerate(itertools.pairwise(depths.tolist())):
+        lines.append(f"    s{k} = min(max(x - {low!r}, 0.0), {high - low!r})")
+    return [*lines, f"    beyond = max(x - {depths[-1].item()!r}, 0.0)"]
 
 
 def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
@@ -75,19 +71,15 @@ def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
 
 
 def _energy(depths: np.ndarray, forces: np.ndarray, cubics: np.ndarray, slope: float) -> str:
+    cells = zip(forces.tolist(), cubics.T.tolist(), strict=False)
     terms = [
         f"s{k} * ({f!r} + s{k} * ({m / 2!r} + s{k} * ({c2 / 3!r} + s{k} * {c3 / 4!r})))"
-        for k, (f, (c3, c2, m, _)) in enumerate(
-            zip(forces.tolist(), cubics.T.tolist(), strict=False)
-        )
+        for k, (f, (c3, c2, m, _)) in enumerate(cells)
     ]
-    total = " + ".join(
-        [*terms, f"beyond * ({forces[-1].item()!r} + {float(slope) / 2!r} * beyond)"]
-    )
-    head = "def energy(depth, depth_scale, force_scale):"
-    return "\n".join(
-        [head, *_parts(depths), f"    return force_scale * depth_scale * ({total})", ""]
-    )
+    last = f"beyond * ({forces[-1].item()!r} + {float(slope) / 2!r} * beyond)"
+    total = " + ".join([*terms, last])
+    head, stored = "def energy(depth, depth_scale, force_scale):", "force_scale * depth_scale"
+    return "\n".join([head, *_parts(depths), f"    return {stored} * ({total})", ""])
 
 
 GEOMETRY = of_rows(EXAMPLE)

@@ -9,9 +9,6 @@ from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
-MARGIN = 100.0
-"""Errors count as resolved from this many times the reference's own error on."""
-
 AIM = 0.01
 """Relative standard error whose cheapest tolerance is marked."""
 
@@ -77,7 +74,7 @@ def integration_figure(accuracy: Results) -> "style.Figure":
 def _ladder(axes: "style.Axes", here: Results, work: str) -> None:
     """One line a method; what the reference cannot resolve is hollow."""
     factor = 1e3 if work == "seconds" else 1.0
-    floor = MARGIN * float(here["reference_error"])
+    floor = targets.MARGIN * float(here["reference_error"])
     for k, method in enumerate(here["integrator"].values):
         x, y = here[work].values[k] * factor, here["error"].values[k]
         look, unresolved = {**style.look(k), "ms": 2.8, "mew": 0.6}, y < floor

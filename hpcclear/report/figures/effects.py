@@ -112,10 +112,9 @@ def statements(content: Results, seconds: Times) -> list[str]:
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
     last = f"No effect can be neglected within {tolerance}."
     if chosen:
-        names = ", ".join(named(content, chosen))
+        names, saved = ", ".join(named(content, chosen)), saving(content, chosen, seconds).words
         last = (
-            f"Within {tolerance} these effects can be neglected: {names}. "
-            f"Run time saved: {saving(content, chosen, seconds).words}."
+            f"Within {tolerance} these effects can be neglected: {names}. Run time saved: {saved}."
         )
     doubts = (undecided(content, k) for k in singles)
     return [*filter(None, doubts), *distinguished(content), last]

@@ -27,9 +27,8 @@ class Placed:
             self.angles[body.name] = angle
         self.ground = {one.name: np.array([one.x, one.y]) for one in mechanism.ground.points}
         sliders: list[Any] = [j for j in mechanism.joints if getattr(j, "height", None)]
-        self._sliders = [
-            self.at(one.point) + side * one.length for one in sliders for side in (-0.5, 0.5)
-        ]
+        ends = [(one, side) for one in sliders for side in (-0.5, 0.5)]
+        self._sliders = [self.at(one.point) + side * one.length for one, side in ends]
 
     def at(self, place: str) -> Array:
         """A place (2,), ``"body.point"``, m."""

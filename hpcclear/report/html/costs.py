@@ -12,9 +12,6 @@ from hpcclear.results.content import Results, Variable
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
-MARGIN = 100.0
-"""The reference must be this many times better than what is measured against it; smaller errors are not resolved."""
-
 
 def accuracy(found: Results, content: Content) -> list[object]:
     """Cheapest settings for three errors in words, then tables; the figures show every other source of error."""
@@ -83,9 +80,9 @@ def resolution(found: Results) -> str:
     """Return what the reference of f can distinguish, in words."""
     own = float(found["reference_error"].sel(quantity="objective"))
     least = float(np.nanmin(found["error"].sel(quantity="objective")))
-    if own * MARGIN <= least:
-        return f"its own error is {own:.0e}, {MARGIN:.0f} times below all errors shown"
-    return f"its own error is {own:.0e}: errors below {MARGIN * own:.0e} are not resolved"
+    if own * targets.MARGIN <= least:
+        return f"its own error is {own:.0e}, {targets.MARGIN:.0f} times below all errors shown"
+    return f"its own error is {own:.0e}: errors below {targets.MARGIN * own:.0e} are not resolved"
 
 
 PARTS = (SectionOf(10, "accuracy", "costs", "Accuracy and run time", accuracy, "accuracy"),)

@@ -99,10 +99,8 @@ def drawing_of(file: File) -> Drawing:
 def _left(root: ElementTree.Element, lone: Counter[str]) -> list[str]:
     """What the document has and a scene does not."""
     lone["elements of the drawing layer"] = sum(map(_is_drawing, root))
-    lone["links of one connector"] = sum(
-        row.tag in _LINKS and not _is_drawing(row) and len(row.findall("connector")) < 2
-        for row in root
-    )
+    links = [row for row in root if row.tag in _LINKS and not _is_drawing(row)]
+    lone["links of one connector"] = sum(len(row.findall("connector")) < 2 for row in links)
     for row in root:
         if row.tag not in ("connector", "program", "selected", "ratios", *_LINKS):
             lone[f"elements {row.tag[:40]!r}"] += 1

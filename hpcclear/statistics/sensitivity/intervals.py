@@ -75,9 +75,8 @@ class IntervalDesign:
         cut, limits, settings = self.settings.n_points, self.intervals[k], self.settings
         if np.isfinite(values[:cut]).sum() < settings.needed(len(limits)) + spare:
             return None, None
-        surface = fit_response_surface(
-            points[:cut], values[:cut], limits, settings.order, chosen=settings.chosen
-        )
+        order, chosen = settings.order, settings.chosen
+        surface = fit_response_surface(points[:cut], values[:cut], limits, order, chosen=chosen)
         if np.isfinite(values[cut:]).sum() < 2:
             return surface, None
         return surface, accuracy(values[cut:], surface.predict(points[cut:]))

@@ -80,12 +80,10 @@ class SurfaceSearch:
             raise InputError("test points", len(values), reason, remedy)
 
     def _try(self) -> None:
-        settings = self._settings
+        settings, training = self._settings, (self._points, self._values, self._bounds)
         for order in settings.orders:
             try:
-                surface = fit_response_surface(
-                    self._points, self._values, self._bounds, order, chosen=settings.chosen
-                )
+                surface = fit_response_surface(*training, order, chosen=settings.chosen)
             except InputError as refusal:
                 self._refusal = refusal
                 continue

@@ -132,9 +132,8 @@ def _path(z: Array, values: Array, known: Integers, order: int, steps: int) -> l
     distinct = own > DEPENDENT * whole
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # of terms that others make up: dropped
-        _, active, _ = lars_path(
-            columns[:, distinct] / own[distinct], left, method="lar", max_iter=steps, Gram=None
-        )
+        unit = columns[:, distinct] / own[distinct]
+        _, active, _ = lars_path(unit, left, method="lar", max_iter=steps, Gram=None)
     return [tuple(row) for row in further[distinct][active].tolist()]
 
 

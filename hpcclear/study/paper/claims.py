@@ -301,10 +301,7 @@ def judge(
 
 def write(run: StudyRun, findings: Sequence[Finding]) -> None:
     """Write claims.nc."""
-    data = {
-        "text": np.array(CLAIMS),
-        "verdict": np.array([one for one, _ in findings], np.int8),
-        "figure": np.array([text for _, text in findings]),
-    }
+    verdicts, figures = zip(*findings, strict=True)
+    data = {"text": CLAIMS, "verdict": verdicts, "figure": figures}
     coords = {"claim": np.arange(1, len(CLAIMS) + 1)}
     run.write(dataset.dataset("claims", coords, data))

@@ -27,11 +27,8 @@ _SPEED = 5000.0 * 2.0 * math.pi / 60.0  # rad/s
 def own_names(scene: Scene) -> dict[str, str]:
     """The study's own name of each of the paper's variables that it varies."""
     symbol_of = {SHORT_NAMES[symbol]: symbol for symbol in SYMBOLS}
-    return {
-        symbol_of[variable.paths]: variable.name
-        for variable in scene.required_study.variables
-        if variable.paths in symbol_of
-    }
+    known = [row for row in scene.required_study.variables if row.paths in symbol_of]
+    return {symbol_of[row.paths]: row.name for row in known}
 
 
 def is_the_papers(scene: Scene) -> bool:

@@ -49,9 +49,8 @@ class Turns:
         if len(mean):
             step = mean.argmax(axis=0)
             most = mean[step, np.arange(mean.shape[1])]
-            self.when = np.where(
-                most > self.largest, 0.5 * (steps.time[1:] + steps.time[:-1])[step], self.when
-            )
+            middle = 0.5 * (steps.time[1:] + steps.time[:-1])
+            self.when = np.where(most > self.largest, middle[step], self.when)
             self.largest = np.maximum(most, self.largest)
         closing = np.flatnonzero(np.diff(steps.revolution) > 0)
         for k in closing:

@@ -188,10 +188,8 @@ def _tighten(effort: Effort, copies: _Copies, rtol: float) -> Generator[Segment,
     if len(new.outcomes) < total or effort.failed is not None:
         return False
     copies.start = Start(_woven(copies.start[1::2].rows, new.start.rows))
-    copies.outcomes = [
-        Outcome(_woven(old[1::2].rows, added.rows))
-        for old, added in zip(copies.outcomes, new.outcomes, strict=True)
-    ]
+    pairs = zip(copies.outcomes, new.outcomes, strict=True)
+    copies.outcomes = [Outcome(_woven(old[1::2].rows, added.rows)) for old, added in pairs]
     return True
 
 
@@ -237,10 +235,8 @@ def _join(copies: _Copies, new: _Copies) -> None:
     """Take new copies in, which have gone as far."""
     copies.start = Start(np.concatenate([copies.start.rows, new.start.rows]))
     copies.strictness = np.concatenate([copies.strictness, new.strictness])
-    copies.outcomes = [
-        Outcome(np.concatenate([a.rows, b.rows]))
-        for a, b in zip(copies.outcomes, new.outcomes, strict=True)
-    ]
+    pairs = zip(copies.outcomes, new.outcomes, strict=True)
+    copies.outcomes = [Outcome(np.concatenate([a.rows, b.rows])) for a, b in pairs]
 
 
 def _interval(copies: _Copies, sample: Sample) -> _Interval:
