@@ -18,8 +18,8 @@ from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
+from hpcclear.scene.faults import explained
 from hpcclear.scene.planar import Planar
-from hpcclear.scene.validation import validated
 
 TEXT = """
 kind = "planar"
@@ -106,7 +106,7 @@ def changed(path, value):
 
 
 def test_tables_are_read_into_data_and_assembled():
-    mechanism = mechanism_of(validated(Planar, TABLES))
+    mechanism = mechanism_of(Planar.model_validate(TABLES))
     assert [body.name for body in mechanism.bodies] == ["crank", "coupler", "rocker"]
     crank, coupler, rocker = mechanism.bodies
     assert (crank.mass, crank.center) == (0.2, (0.02, 0.0))
@@ -149,8 +149,9 @@ def test_tables_are_read_into_data_and_assembled():
     ],
 )
 def test_wrong_tables_are_refused_by_name(path, value, key, said):
-    with pytest.raises(InputError) as caught:
-        mechanism_of(validated(Planar, changed(path, value)))
+    tables = changed(path, value)
+    with pytest.raises(InputError) as caught, explained(tables):
+        mechanism_of(Planar.model_validate(tables))
     assert caught.value.key.removeprefix("mechanism.") == key
     assert said in str(caught.value)
 

@@ -6,7 +6,7 @@ import report_data as data
 import xarray as xr
 
 from hpcclear.report import targets
-from hpcclear.scene.loading import load_scene
+from hpcclear.scene import load_scene
 
 SCENE = load_scene("jobs/slider_crank.toml").to_toml()
 

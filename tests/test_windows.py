@@ -16,7 +16,6 @@ from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
 from hpcclear.scene.describing import implausible
-from hpcclear.scene.validation import validated
 
 KEPT = 0.1
 """J, what the benchmark allows energy to drift by."""
@@ -49,7 +48,7 @@ def windows(count, rtol, feedback):
         "averaged_revolutions": 8,
     }
     content = {"format_version": 2, "mechanism": mechanism, "numerics": numerics}
-    return validated(Scene, {**content, "effects": {"gravity": 9.81}})
+    return Scene.model_validate({**content, "effects": {"gravity": 9.81}})
 
 
 def as_one_body(count, time):

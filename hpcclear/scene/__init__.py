@@ -3,8 +3,7 @@
 from typing import TYPE_CHECKING
 
 from hpcclear.scene.describing import differences
-from hpcclear.scene.loading import load_scene
-from hpcclear.scene.scene import Scene
+from hpcclear.scene.scene import Scene, load_scene
 
 if TYPE_CHECKING:
     from hpcclear.scene.schema import scene_schema

@@ -4,10 +4,13 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 
+from hpcclear.base.units import is_written_in, to_si
+from hpcclear.base.written import reading, shown, text_of, unit_for
 from hpcclear.plugins.sources import digest
 from hpcclear.scene.about import inputs_of
 from hpcclear.scene.driving import CrankTorque, speed_entry
-from hpcclear.scene.paths import flatten
+from hpcclear.scene.fields import Content
+from hpcclear.scene.paths import curve_at, flatten, replace
 from hpcclear.scene.planar import Planar, slender_inertia
 from hpcclear.scene.slider_crank import SliderCrank
 from hpcclear.scene.tables import SceneTables
@@ -262,3 +265,40 @@ def differences(first: SceneTables, second: SceneTables) -> list[str]:
     if not lines and first.hash != second.hash:
         lines.append("study: the order of variables or random inputs")
     return lines
+
+
+def as_written(scene: SceneTables) -> Content:
+    """The resolved content of a scene, quantities as they were written."""
+    content = scene.resolved()
+    for path, value in flatten(content):
+        pairs = curve_at(path)
+        units = _unit_of(scene, path) if pairs is None else (pairs.x, pairs.unit)
+        if units:
+            content = replace(content, path, _as_written(scene, value, units))
+    return content
+
+
+def _unit_of(scene: SceneTables, path: str) -> str:
+    """The SI unit of an entry of the resolved content, "" for one without or of which it is not known."""
+    if path in scene.numeric_paths():
+        return scene.unit(path)
+    top, table, name, *_ = (*path.split("."), "", "")
+    rows = () if scene.study is None or top != "study" else getattr(scene.study, table, ())
+    if table not in ("variables", "random"):
+        return ""
+    return next((scene.unit(one.paths[0]) for one in rows if one.name == name and one.paths), "")
+
+
+def _as_written(scene: SceneTables, value: object, unit: str | tuple[str, str]) -> object:
+    """A number (SI) as a text of the unit that was written, where that reads the same; lists and pairs likewise."""
+    if isinstance(value, list):
+        pair = isinstance(unit, tuple) and value and isinstance(value[0], float)
+        units = unit if pair else [unit] * len(value)
+        return [_as_written(scene, one, its) for one, its in zip(value, units, strict=True)]
+    unit = unit if isinstance(unit, str) else unit[1]
+    if not isinstance(value, float):
+        return value
+    with reading(scene._texts):
+        text = text_of(value, unit) or (unit_for(unit) != unit and shown(value, unit))
+    same = text and is_written_in(text) and to_si(text, unit, decided=True) == value
+    return text if same else value

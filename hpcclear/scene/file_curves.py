@@ -14,10 +14,10 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
+from hpcclear.scene.faults import explained
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, Tables, invalid
 from hpcclear.scene.paths import curve_at, curves, files_named, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
-from hpcclear.scene.validation import validated
 
 TURN = 2 * math.pi
 SEAM = 0.02
@@ -275,8 +275,8 @@ def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
         listed = ", ".join(curves()).replace("*", "NAME")
         remedy = f"Files stand in study.random.NAME, {listed}"
         raise InputError(f"{key}.file", row["file"], "no file is read here", remedy)
-    with at(key):
-        curve = validated(FileCurve, row)
+    with at(key), explained(row):
+        curve = FileCurve.model_validate(row)
     if pairs.x == "s":
         return against_time(curve, folder, pairs.unit, key)
     return pairs_of(curve, folder, pairs.unit, key, _turns(content))

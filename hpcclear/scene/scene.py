@@ -1,24 +1,122 @@
-"""The scene: one validated, frozen description of what is simulated."""
+"""The scene: a TOML file, or a mapping, read, validated and frozen; and the study checked against its mechanism."""
 
 import contextlib
 import json
-from collections.abc import Mapping
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import tomli_w
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, ValidationError
 
 from hpcclear.base import markup
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.base.outcome import record_type
-from hpcclear.base.units import is_written_in, to_si
-from hpcclear.base.written import Reading, Texts, reading, shown, text_of, unit_for
-from hpcclear.scene import describing
+from hpcclear.base.plain import plain as printable
+from hpcclear.base.units import is_written_in, noting
+from hpcclear.base.written import Reading, Texts, reading
+from hpcclear.plugins.sources import using
+from hpcclear.scene import describing, domain
 from hpcclear.scene.consistency import ConsistentTables
-from hpcclear.scene.fields import Content
+from hpcclear.scene.faults import explained
+from hpcclear.scene.fields import Content, Tables, invalid, nearest
 from hpcclear.scene.fitted import entry_replaced
-from hpcclear.scene.paths import curve_at, flatten, replace
-from hpcclear.scene.validation import dotted, scene_of
+from hpcclear.scene.paths import PHYSICAL, files_named, flatten, of_kinds, replace
+from hpcclear.scene.plugged import check_trust, texts_of, with_texts
+from hpcclear.scene.study import Study
+from hpcclear.scene.syntax import DEEPEST, file_text, parse
+from hpcclear.scene.tables import SceneTables, plain
+from hpcclear.scene.variables import StudyVariable
+
+Whole = TypeVar("Whole", bound=SceneTables)
+
+_KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
+
+
+def load_scene(
+    source: str | Path | Mapping[str, object], overrides: Sequence[str] = (), *, trust: bool = False
+) -> "Scene":
+    """Read and validate a scene.
+
+    Parameters
+    ----------
+    source : path or mapping
+        A TOML file, or its parsed content.
+    overrides : sequence of str
+        ``"key.path=value"`` entries that replace what the file says; the value is read as TOML if
+        it can be, else as a string, so ``joints.crank_rod.clearance=0.5 mm`` needs no quotes.
+    trust : bool
+        Whether Python text that the content itself carries may be run, as results carry that of plug-ins. Files beside the
+        scene file that it names are run without it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or the content makes no mechanism; it names key, value, reason
+        and remedy.
+    """
+    if isinstance(source, Mapping):
+        text, content = None, dict(source)
+    else:
+        text = file_text(Path(source), "scene file", "Give the path of a TOML scene file")
+        content = parse(text, str(source))
+    for override in overrides:
+        content = entry_replaced(content, *_override(override))
+    folder = Path() if isinstance(source, Mapping) else Path(source).parent
+    named, read_as = files_named(content), list[Reading]()
+    if named:
+        from hpcclear.scene.file_curves import with_values  # with the readers of all kinds of files
+
+        filled, read_as = with_values(content, folder)
+        content = dict(filled)
+    own_plugins = "plugins" in content
+    if not trust:
+        check_trust(content, "mapping" if text is None else str(source))
+    if text is not None and not own_plugins:
+        content = with_texts(content, lambda module: _beside(folder, module))
+    scene = scene_of(Scene, content)
+    scene._readings = (*scene.readings, *read_as)
+    # results carry what was set, and the values of files: whoever has one needs nothing else
+    notes = [*(f"set: {one}" for one in overrides), *map(str, read_as)]
+    head = "".join(f"# {printable(' '.join(note.split()))}\n" for note in notes)
+    plugins = {} if scene.plugins is None else {"plugins": plain(scene.plugins)}
+    if text is None:
+        scene._text = head and head + scene.to_toml()
+    elif head or own_plugins:
+        scene._text = head + tomli_w.dumps({**content, **plugins}, multiline_strings=True)
+    else:
+        below = tomli_w.dumps(plugins, multiline_strings=True)
+        scene._text = f"{text}\n\n{below}" if plugins else text
+    return scene
+
+
+def _beside(folder: Path, module: str) -> str | None:
+    """The text of a Python file beside the scene file, None where there is none."""
+    path = folder / f"{module}.py"
+    if not path.exists():
+        return None
+    return file_text(path, "Python file", "Give a plug-in in Python").replace("\r\n", "\n")
+
+
+def _override(text: str) -> tuple[str, object]:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not dotted(key):
+        reason = "is not of the form key.path=value"
+        raise InputError("--set", text, reason, "Write, say, --set numerics.rtol=1e-8")
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        parsed = {}
+    # A value with a line break could smuggle in a second key; then it is just a string.
+    return key, parsed["value"] if parsed.keys() == {"value"} else value
+
+
+def dotted(path: object) -> bool:
+    """Whether this is a dotted path, no deeper than a scene may be."""
+    return isinstance(path, str) and _KEY.fullmatch(path) is not None and path.count(".") < DEEPEST
 
 
 class Scene(ConsistentTables):
@@ -89,40 +187,11 @@ class Scene(ConsistentTables):
 
     def to_toml(self) -> str:
         """TOML text of the resolved content, quantities as they were written; loading it gives an equal scene."""
-        content = self.resolved()
-        for path, value in flatten(content):
-            pairs = curve_at(path)
-            units = self._unit_of(path) if pairs is None else (pairs.x, pairs.unit)
-            if units:
-                content = replace(content, path, self._as_written(value, units))
+        content = describing.as_written(self)
         with contextlib.suppress(InputError):
             if scene_of(Scene, content) == self:
                 return tomli_w.dumps(content, multiline_strings=True)
         return tomli_w.dumps(self.resolved(), multiline_strings=True)
-
-    def _unit_of(self, path: str) -> str:
-        """The SI unit of an entry of the resolved content, "" for one without or of which it is not known."""
-        if path in self._numbers:
-            return self.unit(path)
-        top, table, name, *_ = (*path.split("."), "", "")
-        rows = () if self.study is None or top != "study" else getattr(self.study, table, ())
-        if table not in ("variables", "random"):
-            return ""
-        return next((self.unit(one.paths[0]) for one in rows if one.name == name and one.paths), "")
-
-    def _as_written(self, value: object, unit: str | tuple[str, str]) -> object:
-        """A number (SI) as a text of the unit that was written, where that reads the same; lists and pairs likewise."""
-        if isinstance(value, list):
-            pair = isinstance(unit, tuple) and value and isinstance(value[0], float)
-            units = unit if pair else [unit] * len(value)
-            return [self._as_written(one, its) for one, its in zip(value, units, strict=True)]
-        unit = unit if isinstance(unit, str) else unit[1]
-        if not isinstance(value, float):
-            return value
-        with reading(self._texts):
-            text = text_of(value, unit) or (unit_for(unit) != unit and shown(value, unit))
-        same = text and is_written_in(text) and to_si(text, unit, decided=True) == value
-        return text if same else value
 
     def with_(self, changes: Mapping[str, object] | None = None, /, **more: object) -> "Scene":
         """A new, validated scene with some entries replaced.
@@ -158,6 +227,137 @@ class Scene(ConsistentTables):
 
     def __hash__(self) -> int:
         return hash(self.hash)
+
+
+def scene_of(kind: type[Whole], content: Content, before: SceneTables | None = None) -> Whole:
+    """The scene of a file's tables, with the readings of its units; raises InputError as `load_scene`.
+
+    `before`: the scene that was changed, whose numbers stay as they were written.
+
+    Source text that it carries is run: `load_scene` sees to it that it may be.
+    """
+    read: dict[str, str] = {}
+    texts = {} if before is None else dict(before.written)
+    with (
+        noting(read.__setitem__),
+        of_kinds(content),
+        using(texts_of(content)) as packages,
+        explained(content),
+    ):
+        with reading(texts):
+            scene = kind.model_validate(content)
+        rows = {name: {"version": version} for name, version in sorted(packages.items())}
+        if rows != content.get("plugins", {}).get("packages", {}):
+            scene = kind.model_validate(replace(content, "plugins.packages", rows))
+        own = set[object](before.written) if before else set(_numbers_in(content))
+        kept = [
+            k for k, text in texts.items() if is_written_in(text) or (k if before else k[0]) in own
+        ]
+        scene._texts = {key: texts[key] for key in kept}
+        if scene.study is not None:
+            with reading(dict(scene.written)):
+                _check_study(scene, scene.study)
+    scene._readings = tuple(_placed(content, read)) if read else ()
+    return scene
+
+
+def _numbers_in(content: object) -> Iterator[float]:
+    """Every plain number of nested tables and lists."""
+    if isinstance(content, (Mapping, list, tuple)):
+        for one in content.values() if isinstance(content, Mapping) else content:
+            yield from _numbers_in(one)
+    elif isinstance(content, (int, float)):
+        yield content
+
+
+def _placed(content: Tables, read: Mapping[str, str]) -> Iterator[Reading]:
+    """Each text that was read as `read` says, with the first entry that has it."""
+    left = dict(read)
+    for key, entry in flatten(content):
+        level = [entry]
+        while level and isinstance(level[0], list):
+            level = [one for inner in level if isinstance(inner, list) for one in inner]
+        for text in level:
+            if isinstance(text, str) and text.strip() in left:
+                yield Reading(key, text.strip(), left.pop(text.strip()))
+
+
+def _check_study(scene: SceneTables, study: Study) -> None:
+    """Raise InputError, or an error for validators, unless the study fits the mechanism."""
+    _check_worn_inputs(scene, study)
+    numbers = set(scene.numeric_paths())
+    for table, rows in (("variables", study.variables), ("random", study.random)):
+        for row in rows:
+            of_rows = row.entry_paths if isinstance(row, StudyVariable) else ()
+            for path in (*row.paths, *of_rows):
+                if path not in numbers:
+                    reason = f"drives {path}, and this scene has no number there"
+                    remedy = "Give that entry a value first, or remove the variable"
+                    raise invalid(reason, remedy, f"study.{table}.{row.name}")
+    _check_corners(scene, study)
+    for variable in study.variables:
+        if variable.rows:
+            scene.baseline(variable.name)
+    domain.box(scene, widen=tuple(row.name for row in study.random))
+
+
+def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
+    """Inputs that are clearances of worn joints need lives that are followed so far."""
+    clearances = [f"{scene.joint_key(name)}.clearance" for name in scene.worn_joints()]
+    for row in study.worn:
+        key = f"study.random.{row.name}"
+        if scene.wear is None:
+            raise invalid("[wear] is missing", "Add [wear] as in jobs/worn_study.toml", key, "wear")
+        for path in row.paths:
+            if path not in clearances:
+                remedy = nearest(path, clearances) if clearances else "Give joints a table wear"
+                raise invalid(f"{path} is no clearance of a joint that wears", remedy, key, "wear")
+        assert row.cycles is not None  # by validation
+        if row.cycles > scene.wear.cycles:
+            reason = f"lives are followed for {scene.wear.cycles:g} revolutions only"
+            raise invalid(reason, "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles)
+
+
+def _check_corners(scene: SceneTables, study: Study) -> None:
+    """Each bound of each variable, widened by what is random about it, must still make a mechanism."""
+    names = (*PHYSICAL, "numerics", "plugins")
+    content = {name: plain(table) for name in names if (table := getattr(scene, name))}
+    reach = {row.name: study.reach(row) for row in study.random if not row.absolute}
+    moved = [one for one in study.variables if one.paths and one.ratio is None]
+    spans = {one.name: ("variables", one.paths, one.bounds) for one in moved}
+    for row in study.random:
+        if row.name not in study.names:
+            centre = 0.0 if row.absolute else scene.number(row.paths[0])
+            reach[row.name] = study.reach(row)
+            spans[row.name] = ("random", row.paths, (centre, centre))
+    for name, (table, paths, (lower, upper)) in spans.items():
+        corners = [(table, lower), (table, upper)] if table == "variables" else []
+        if name in reach:
+            low, high = reach[name]
+            corners += [("random", lower + low), ("random", upper + high)]
+        for key, value in corners:
+            entries, words = dict.fromkeys(paths, value), scene.shown(paths[0], value)
+            _check_corner(scene, content, entries, f"study.{key}.{name}", f"{name} = {words}")
+    for variable in study.variables:
+        for option in variable.rows:
+            entries = {path: float(option.entries[path]) for path in variable.entry_paths}
+            key = f"study.variables.{variable.name}"
+            _check_corner(scene, content, entries, key, f"{variable.name} = {option.name!r}")
+
+
+def _check_corner(
+    scene: SceneTables, content: Tables, entries: Mapping[str, float], key: str, words: str
+) -> None:
+    """An error for validators unless the scene is one with other entries."""
+    for path, value in entries.items():
+        content = replace(content, path, value)
+    try:
+        type(scene).model_validate(content)
+    except ValidationError as error:
+        said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
+        reason = getattr(said, "reason", "it is not valid")
+        reason = f"reaches {words}, which makes no mechanism: {reason}"
+        raise invalid(reason, "Narrow it", key) from None
 
 
 def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts: Texts) -> Scene:

@@ -17,8 +17,7 @@ from hpcclear.scene.fields import Content
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, turns_of
-from hpcclear.scene.scene import Scene
-from hpcclear.scene.validation import scene_of
+from hpcclear.scene.scene import Scene, scene_of
 
 GENTLE_RAMP = 50.0
 """Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""

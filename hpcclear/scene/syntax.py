@@ -1,9 +1,21 @@
-"""What is wrong with a text that is not TOML: the line, what it reads, and the line that is likely meant."""
+"""TOML texts to tables; of a text that is none: the line, what it reads, and the line that is likely meant."""
 
 import itertools
 import re
 import tomllib
 from collections.abc import Callable
+from pathlib import Path
+
+from hpcclear.base.errors import InputError, content_of
+
+LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
+DEEPEST = 16  # levels of tables and arrays; a scene needs six
+_SHORTER = "Scenes have a few thousand bytes"
+# tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
+# is parsed.
+_DOTTED = re.compile(
+    r"""(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){17}"""
+)
 
 _NO_QUOTES = dict.fromkeys(
     map(ord, "\u201c\u201d\u201e\u201f\u00ab\u00bb\u2033\u2018\u2019\u2032"), '"'
@@ -138,3 +150,30 @@ def _repeated(lines: list[str], read: str) -> tuple[str, str]:
     return f"{read} gives {name} twice{first}", "Keep one of the two" + (
         "; entries of one table stand together" if header else ""
     )
+
+
+def file_text(path: Path, what: str, remedy: str) -> str:
+    """The text of a file; raises InputError where it cannot be read, is longer than a scene may be, or no UTF-8."""
+    try:
+        return content_of(path, what, LARGEST_FILE, remedy, _SHORTER).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        reason = f"is not UTF-8 text (byte {error.start})"
+        raise InputError(what, str(path), reason, "Save it as UTF-8") from None
+
+
+def parse(text: str, name: str) -> dict[str, object]:
+    """The tables of a TOML text, whatever it holds; `name` says in errors where it stands.
+
+    Raises InputError if it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
+    """
+    where = "scene file", name
+    if len(text) > LARGEST_FILE:
+        raise InputError(*where, f"is larger than {LARGEST_FILE} bytes", _SHORTER)
+    if _DOTTED.search(text):
+        raise InputError(*where, "a key has too many dots", f"Nest at most {DEEPEST} tables")
+    try:
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        raise InputError(*where, "is nested too deeply", f"Nest at most {DEEPEST} levels") from None
+    except ValueError as error:
+        raise InputError(*where, *fault(text.replace("\r\n", "\n"), error)) from None
