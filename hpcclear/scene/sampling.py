@@ -37,7 +37,7 @@ def _chances(
     return list(np.concatenate(parts).T)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=128)
 def _scrambled(seed: int, purpose: str, replicate: int, size: int, span: tuple[int, int]) -> Array:
     """Points of a randomised sequence, (count, size), read only: all designs of a study meet the same."""
     points = sobol(size, generator(seed, f"sobol {purpose}", str(replicate)), *span)

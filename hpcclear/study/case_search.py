@@ -355,4 +355,4 @@ def lengthened(run: StudyRun, asked: Sequence[tuple["CaseSearch", list[int]]]) -
         chosen = [one.choices[row] for one, row in alike]
         fresh = truth.drawn(run, chosen, "search", length or FIRST, length)
         for (one, row), values in zip(alike, fresh, strict=True):
-            one.made[row] = np.concatenate([one.made[row], values], axis=2)
+            one.take(row, values)

@@ -23,7 +23,7 @@ from hpcclear.study.failures import excess_of
 from hpcclear.study.optimisation import Choice, choices
 from hpcclear.study.run import StudyRun
 
-LENGTH, TRENDS = 256, 64
+LENGTH, TRENDS = 128, 64
 """Points of each replicate at which the surrogate is averaged for a design, at least, and for a trend."""
 
 TRENDED = 25

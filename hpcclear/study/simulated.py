@@ -4,6 +4,7 @@ Sources: of what a surrogate explains (control variates) P. Glasserman, "Monte C
 section 4.1, doi:10.1007/978-0-387-21617-1.
 """
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -24,6 +25,10 @@ Asked = tuple[Array, Array]
 """Objectives and constraints of a design with standard errors, (2, k), and what replicates shift them, (k, replicates)."""
 
 
+GROWN = 1.25
+"""Times as many designs from which what the surrogate explains is estimated anew."""
+
+
 class Simulated:
     """Designs of a case in their order, `choices`, with their simulations, `made`, as `hpcclear.study.truth.made` returns
     them."""
@@ -36,8 +41,10 @@ class Simulated:
         self.made = [truth.nothing(run)] * len(self.choices)
         self._at = {False: dict[tuple[int, int], Asked](), True: dict[tuple[int, int], Asked]()}
         self._guessed: dict[int, Array] = {}
-        self._slopes: tuple[int, Array] = 0, np.zeros(0)
-        self._parts: dict[int, tuple[int, Array]] = {}
+        self._less = dict[tuple[int, int, int, int], Asked]()
+        self._slopes = dict[int, Array]()
+        self._parts = dict[tuple[int, int, int], Array]()
+        self._rungs = dict[int, int]()
 
     def __len__(self) -> int:
         return len(self.choices)
@@ -53,6 +60,11 @@ class Simulated:
         self.choices += fresh
         self.made += [truth.nothing(self._run)] * len(fresh)
         return list(range(len(self.choices) - len(fresh), len(self.choices)))
+
+    def take(self, row: int, values: Array) -> None:
+        """Further simulations of a design, (k, replicates, n)."""
+        self.made[row] = np.concatenate([self.made[row], values], axis=2)
+        self._rungs.clear()
 
     def places(self, bounds: Array) -> Array:
         """Sampling coordinates of all designs, (n, d), within bounds, (d, 2), but for round-off."""
@@ -91,42 +103,55 @@ class Simulated:
 
     def of(self, row: int, length: int) -> Asked:
         """A design by so many points of each replicate, less what the surrogate says that more points would change."""
-        found, shifts = self._asked(row, length)
         if not self._guesses:
-            return found, shifts
-        slopes, guess = self._explained(), partial(self._asked, row, guessed=True)
-        (few, its), (many, their) = guess(length), guess(self._guesses.length)
-        left = shifts - slopes[:, None] * (its - their)
-        errors = found[1] - (1.0 - self._left(length, slopes)) * spread(shifts)
-        return np.array([found[0] - slopes * (few - many)[0], errors]), left
+            return self._asked(row, length)
+        key = row, length, self._rung(1), self._rung(length)
+        if key not in self._less:
+            (found, shifts), slopes = self._asked(row, length), self._explained()
+            guess = partial(self._asked, row, guessed=True)
+            (few, its), (many, their) = guess(length), guess(self._guesses.length)
+            errors = found[1] - (1.0 - self._left(length, slopes)) * spread(shifts)
+            moved = np.array([found[0] - slopes * (few - many)[0], errors])
+            self._less[key] = moved, shifts - slopes[:, None] * (its - their)
+        return self._less[key]
+
+    def _rung(self, length: int) -> int:
+        """How many designs have so many points of each replicate, in steps of `GROWN`."""
+        if length not in self._rungs:
+            count = int((self.sizes >= length).sum())
+            self._rungs[length] = int(math.log(count) / math.log(GROWN))
+        return self._rungs[length]
 
     def _left(self, length: int, slopes: Array) -> Array:
         """Part of the errors by so many points that the surrogate does not explain, (k,). It is estimated from all designs
         together, because the replicates of one design are too few for it."""
-        rows = [k for k, size in enumerate(self.sizes) if size >= length]
-        if self._parts.get(length, (0, slopes))[0] != len(rows):
+        key = length, self._rung(1), self._rung(length)
+        if key not in self._parts:
+            rows = [k for k, size in enumerate(self.sizes) if size >= length]
             ours, its, their = (
                 np.nan_to_num([self._asked(k, *which)[1] for k in rows])
                 for which in ((length,), (length, True), (self._guesses.length, True))
             )
             left = ((ours - slopes[:, None] * (its - their)) ** 2).sum(axis=(0, 2))
             own = (ours**2).sum(axis=(0, 2))
-            self._parts[length] = len(rows), np.sqrt(left / np.where(own > 0.0, own, np.inf))
-        return self._parts[length][1]
+            self._parts[key] = np.sqrt(left / np.where(own > 0.0, own, np.inf))
+        return self._parts[key]
 
     def _explained(self) -> Array:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
-        rows = [k for k, one in enumerate(self.made) if one.size]
-        if self._slopes[0] != len(rows):
+        key = self._rung(1)
+        if key not in self._slopes:
+            rows = [k for k, one in enumerate(self.made) if one.size]
             ours, theirs = (
                 np.nan_to_num([self._asked(k, FIRST, guessed)[1] for k in rows])
                 for guessed in (False, True)
             )
             squares = (theirs**2).sum(axis=(0, 2))
             both = (ours * theirs).sum(axis=(0, 2))
-            slopes = np.where(squares > 0.0, both / np.where(squares > 0.0, squares, 1.0), 0.0)
-            self._slopes = len(rows), slopes
-        return self._slopes[1]
+            self._slopes[key] = np.where(
+                squares > 0.0, both / np.where(squares > 0.0, squares, 1.0), 0.0
+            )
+        return self._slopes[key]
 
     def _asked(self, row: int, length: int, guessed: bool = False) -> Asked:
         """A design by so many points of each replicate, simulated or by the surrogate."""

@@ -67,7 +67,7 @@ def fit_kriging(
     `restarts` starting points besides the first, drawn by `rng`, with length scales (in the unit cube) between `lengths`, and
     the noise variance, in units of the variance of the values, between those of `noise`. `shares` (n,): noise variance of
     each value over that one, where the errors of values are known; else they are all alike. `like`: a model of nearly the same
-    values, whose length scales and variances are one more starting point. Raises InputError: points outside
+    values, whose length scales and variances are the first starting point. Raises InputError: points outside
     the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
@@ -80,20 +80,21 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    known = np.ones(len(values)) if shares is None else np.asarray(shares, dtype=np.float64)
+    known = None if shares is None else np.asarray(shares, dtype=np.float64)[valid]
     limits = noise or NOISE_BOUNDS
     dims = unit.shape[1]
     starts = [np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *limits)])]
     box = np.array([SIGNAL_BOUNDS, *[lengths] * dims, limits])
     if like is not None:
         last = np.array([like.signal_variance, *like.length_scales, like.noise_variance])
-        starts.append(np.clip(last, *box.T))
+        starts = [np.clip(last, *box.T)]
     seed = int(rng.integers(2**31))
     with one_thread():
         found = maximise(
-            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, shares=known[valid]
+            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel,
+            shares=1.0 if known is None else known,
         )  # fmt: skip
     return Kriging(
         labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],
-        dropped=int((~valid).sum()), kernel=kernel, shares=None if shares is None else known[valid],
+        dropped=int((~valid).sum()), kernel=kernel, shares=known,
     )  # fmt: skip

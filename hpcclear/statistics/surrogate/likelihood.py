@@ -35,6 +35,8 @@ PART = 250
 FURTHER = 6
 """Starts more on the first part, between these bounds of signal variance, length scales and noise variance."""
 SPANS = (0.3, 10.0), (0.1, 1.0), (1e-6, 1e-3)
+FLAT = 1e-6
+"""Relative change of the likelihood below which it is at its most, where values have known errors."""
 LONGEST = 1.0
 """Length scales are cut there when the search leaves the first part."""
 
@@ -68,6 +70,7 @@ def maximise(
     The search begins from those that are `known`, (d + 2,) each in this order, and from further `restarts` by the seed, within
     `bounds` (d + 2, 2). `shares` (n,): noise variance of each value over the one that is sought.
     """
+    tolerance = FLAT if np.ndim(shares) else None
     shares = np.broadcast_to(shares, len(values))
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
@@ -75,15 +78,19 @@ def maximise(
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
     if len(parts) == 1:
-        top = _climbed(starts, limits, centred, values, kernel, shares)
+        top = _climbed(starts, limits, tolerance, centred, values, kernel, shares)
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
         first = parts[0]
-        top = _climbed(starts, limits, centred[first], values[first], kernel, shares[first])
+        top = _climbed(
+            starts, limits, tolerance, centred[first], values[first], kernel, shares[first]
+        )
         top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
         for part in parts[1:]:
-            top = _climbed([top], limits, centred[part], values[part], kernel, shares[part])
+            top = _climbed(
+                [top], limits, tolerance, centred[part], values[part], kernel, shares[part]
+            )
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
@@ -104,11 +111,11 @@ def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
     return [np.sort(order[:size]) for size in sizes]
 
 
-def _climbed(starts: list[Array], limits: Array, *of: Any) -> Array:
+def _climbed(starts: list[Array], limits: Array, tolerance: float | None, *of: Any) -> Array:
     """The best that is found from these starts, logarithms as `negative_likelihood` of so much takes them, shape (d + 2,)."""
     from scipy.optimize import minimize  # only fitting needs it
 
-    given = {"args": of, "method": "L-BFGS-B", "jac": True, "bounds": limits}
+    given = {"args": of, "method": "L-BFGS-B", "jac": True, "bounds": limits, "tol": tolerance}
     found = [minimize(negative_likelihood, one, **given) for one in starts]
     return np.asarray(min(found, key=lambda one: float(one.fun)).x)
 
