@@ -19,10 +19,8 @@ from hpcclear.base.outcome import FIELDS, IMPACTS, RESPONSES, WIDEST
 
 Function = Callable[..., Array | float]
 
-RECORDED = {"objective": "m"} | {
-    name: FIELDS[name].unit.removeprefix("1")
-    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS, *WIDEST)
-}
+_RECORDED = ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS, *WIDEST)
+RECORDED = {"objective": "m"} | {name: FIELDS[name].unit.removeprefix("1") for name in _RECORDED}
 """Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
 OF_JOINTS = {

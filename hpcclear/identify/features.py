@@ -67,11 +67,10 @@ class Layout:
     def labels(self) -> tuple[str, ...]:
         """Names of the features."""
         parts = ("cosine", "sine") if self.synchronised else ("amplitude",)
-        own = [
-            f"mean of {self.name}" if k == 0 else f"{part} of harmonic {k} of {self.name}"
-            for k in self.orders
-            for part in (parts if k else parts[:1])
-        ]
+        own: list[str] = []
+        for k in self.orders:
+            shown = [f"{part} of harmonic {k}" for part in parts] if k else ["mean"]
+            own += [f"{one} of {self.name}" for one in shown]
         for words, bands in (("", self.bands), ("scatter of ", self.scattered)):
             own += [f"{words}harmonics {a} to {b} of {self.name}" for a, b in bands]
         return tuple(own)

@@ -97,10 +97,9 @@ def check_shape(law: Law) -> None:
     for title, function in functions.items():
         for name in law.arguments(function):
             if name not in given:
-                raise LawError(
-                    f"{title} uses {name!r}, which is not defined",
-                    f"Declare it as a parameter, or in numbers. Known are {', '.join(sorted(given))}",
-                )
+                known = ", ".join(sorted(given))
+                remedy = f"Declare it as a parameter, or in numbers. Known are {known}"
+                raise LawError(f"{title} uses {name!r}, which is not defined", remedy)
     if len(law.read) > declared.LAW_NUMBERS:
         reason = f"reads {len(law.read)} numbers, more than {declared.LAW_NUMBERS}"
         raise LawError(reason, "Compute more of them in once")
@@ -302,10 +301,8 @@ def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
 def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) -> None:
     """LawError unless the force at rest (depths, impact speeds), N, is the elastic part, and that the slope of the energy."""
     if np.ptp(at_rest, axis=1).max() > SAME * at_rest.max():
-        raise LawError(
-            "the force at rest depends on the impact speed, but stored energy depends on the depth alone",
-            "Let the impact speed scale the damping only",
-        )
+        reason = "the force at rest depends on the impact speed, but stored energy depends on the depth alone"
+        raise LawError(reason, "Let the impact speed scale the damping only")
     elastic = np.broadcast_to(elastic_at(law, DEPTHS, given), DEPTHS.shape)
     if not np.allclose(elastic, at_rest[:, 0], rtol=SAME, atol=0.0):
         reason = "elastic differs from the force at a rate of 0"
@@ -318,11 +315,9 @@ def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) 
     off = ~np.isclose(slope, elastic, rtol=SAME, atol=1e-12 * elastic.max())
     if off.any():
         k = int(np.argmax(off))
-        raise LawError(
-            f"the energy does not match the force: at depth {DEPTHS[k]:.3g} m the energy's slope is {slope[k]:.6g} N "
-            f"and the force at rest {elastic[k]:.6g} N",
-            "Correct energy, or leave it out; it is then integrated",
-        )
+        both = f"the energy's slope is {slope[k]:.6g} N and the force at rest {elastic[k]:.6g} N"
+        reason = f"the energy does not match the force: at depth {DEPTHS[k]:.3g} m {both}"
+        raise LawError(reason, "Correct energy, or leave it out; it is then integrated")
 
 
 def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
@@ -334,10 +329,9 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
         raise LawError(f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s", MEND)
     drives = ratio * SPEEDS < -1e-12 * np.abs(ratio * SPEEDS).max()
     if drives.any():
-        raise LawError(
-            f"friction drives sliding on: ratio {ratio[drives][0]:.3g} at {SPEEDS[drives][0]:.3g} m/s",
-            "Give the ratio the sign of the sliding speed",
-        )
+        place = f"ratio {ratio[drives][0]:.3g} at {SPEEDS[drives][0]:.3g} m/s"
+        remedy = "Give the ratio the sign of the sliding speed"
+        raise LawError(f"friction drives sliding on: {place}", remedy)
     if law.deflection is not None:
         rate = np.broadcast_to(evaluate(law.deflection, {**given, **varying}), SPEEDS.shape)
         if not np.isfinite(rate).all():

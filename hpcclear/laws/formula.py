@@ -42,10 +42,9 @@ def law_of(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
         if isinstance(node, ast.Name) and id(node) not in called:
             if node.id not in known:
                 others = ", ".join(sorted({*short, *JOINT}))
-                raise LawError(
-                    f"contains {node.id!r}, which is not a parameter",
-                    f'Give it a unit, units = {{ {node.id} = "m" }}, and a value; known are {others}',
-                )
+                unit = f'Give it a unit, units = {{ {node.id} = "m" }}, and a value'
+                reason = f"contains {node.id!r}, which is not a parameter"
+                raise LawError(reason, f"{unit}; known are {others}")
             node.id = known[node.id]
             used.append(node.id)
     names = list(dict.fromkeys(used))

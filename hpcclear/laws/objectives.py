@@ -139,7 +139,6 @@ def _fits(found: Quantity, unit: str, what: str) -> None:
         raise LawError(f"the unit {unit!r} is not known", "Write, say, N m") from None
     quantity = found if hasattr(found, "magnitude") else registry().Quantity(float(found), "")
     if not quantity.is_compatible_with(expected):
-        raise LawError(
-            f"{what} is in {quantity.to_base_units().units:~P}, and its unit says {unit or 'a plain number'}",
-            "Mend the formula, or the unit",
-        )
+        own, said = f"{quantity.to_base_units().units:~P}", unit or "a plain number"
+        reason = f"{what} is in {own}, and its unit says {said}"
+        raise LawError(reason, "Mend the formula, or the unit")

@@ -181,10 +181,8 @@ def sensitive_words(relative: float, content: Results) -> str:
     # as files have of other objectives only; these have no steady means
     if "objective" in content.attrs:
         remedy = "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
-    return (
-        "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is "
-        f"{100 * relative:.0f} % of f. {remedy}"
-    )
+    half_width = f"From replicas with other starts its half-width is {100 * relative:.0f} % of f"
+    return f"f is sensitive to initial conditions or to the tolerance. {half_width}. {remedy}"
 
 
 def flag_remarks(flags: int) -> list[str]:

@@ -78,12 +78,9 @@ def statistics(
     check_format(Path(output))
     table = DataFrame(_columns(lines, Units(next(iter(every.values())), units)))
     about = [(f"file {name}", one.attrs["path"]) for name, one in every.items()]
-    about += [
-        (f"{what} {name}", line.text)
-        for name, own in lines.items()
-        for what, line in own.items()
-        if not line.estimate.known
-    ]
+    for name, own in lines.items():
+        unknown = [(what, line) for what, line in own.items() if not line.estimate.known]
+        about += [(f"{what} {name}", line.text) for what, line in unknown]
     scenes = [
         f"# {name}: scene {one.attrs.get('scene_hash', '')}\n{one.attrs.get('scene', '')}"
         for name, one in every.items()
@@ -98,12 +95,8 @@ def statistics(
 
 def _columns(lines: spread.Lines, units: Units) -> dict[str, list[object]]:
     """Label and unit, then value and interval of each samples; lines without numbers are left out."""
-    rows = {
-        (label, line.estimate.unit): units.chosen(line.estimate.unit)
-        for own in lines.values()
-        for label, line in own.items()
-        if line.estimate.known
-    }
+    stated = [(label, line.estimate) for own in lines.values() for label, line in own.items()]
+    rows = {(label, one.unit): units.chosen(one.unit) for label, one in stated if one.known}
     shown = [unit or si for (_, si), unit in rows.items()]
     columns: dict[str, list[object]] = {"statistic": [label for label, _ in rows], "unit": [*shown]}
     nothing = spread.Line("", "")

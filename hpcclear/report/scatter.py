@@ -182,10 +182,8 @@ def _chaos(of: Recommended) -> Iterator[Line]:
         text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
     else:
         changed, explained = (100 * float(own[name]) for name in ("chaotic", "chaos_share"))
-        text += (
-            f". Relative perturbations of 1e-9 change {changed:.0f} % of the recommended design's samples "
-            f"and explain {explained:.0f} % of its variance"
-        )
+        text += f". Relative perturbations of 1e-9 change {changed:.0f} % of the recommended design's samples"
+        text += f" and explain {explained:.0f} % of its variance"
     yield Line("chaos", text)
 
 

@@ -165,11 +165,9 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
 
     for choice, whole, many in zip(choices, made, verdicts.rivals(choices), strict=True):
         values, beyond = whole[:2]
-        row: dict[str, object] = {
-            "samples": values.size,
-            "failed": int(np.isnan(values).sum()),
-            "beyond_hertz": int(beyond.sum()),
-        }
+        failed = int(np.isnan(values).sum())
+        row: dict[str, object] = {"samples": values.size, "failed": failed}
+        row["beyond_hertz"] = int(beyond.sum())
         reaches = contest.reaches(settings, values)
         for name, one, reach in zip(("mean", "deviation"), moments(values), reaches, strict=True):
             row |= {name: one.value, f"{name}_error": one.error, f"{name}_reach": reach}

@@ -214,13 +214,11 @@ def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
     there = places_of(effects)
     whole = effects.objective is not None and effects.objective.whole
-    closed = {
-        row.first + k
-        for row in _OTHERS
-        if row.size == MAX_JOINTS
-        for k in _PLACES
-        if k not in (range(1) if whole and row.first == OBJECTIVE_RATES else there)
-    }
+    closed: set[int] = set()
+    for row in _OTHERS:
+        if row.size == MAX_JOINTS:
+            open_ = range(1) if whole and row.first == OBJECTIVE_RATES else there
+            closed |= {row.first + k for k in _PLACES if k not in open_}
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
     return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
 

@@ -295,7 +295,6 @@ def bent(
 def shortened(found: Mapping[str, Number], q: Array, v: Array) -> tuple[Array, Array]:
     """delta (m) and its rate (m/s), shape (m,), of amplitudes and velocities (modes, m); `found`: of `numbers`."""
     by = [found[f"nearer_{mode}"] for mode in range(1, len(q) + 1)]
-    return (
-        0.5 * sum(k * a * a for k, a in zip(by, q, strict=True)),
-        sum(k * a * b for k, a, b in zip(by, q, v, strict=True)),
-    )  # type: ignore[return-value]
+    twice = sum(k * a * a for k, a in zip(by, q, strict=True))
+    rate = sum(k * a * b for k, a, b in zip(by, q, v, strict=True))
+    return 0.5 * twice, rate  # type: ignore[return-value]

@@ -66,10 +66,8 @@ def joints_of(scene: Scene, points: Points | None) -> Joints:
         key = scene.joint_key(name)
         clearance, radius = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
         around = 2.0 * math.pi * get(f"{key}.wear.length")
-        depths = [
-            _coefficient(scene, get, name, surface) / (around * size)
-            for surface, size in (("bearing", radius), ("journal", radius - clearance))
-        ]
+        sizes = ("bearing", radius), ("journal", radius - clearance)
+        depths = [_coefficient(scene, get, name, of) / (around * size) for of, size in sizes]
         columns.append((clearance, radius, *depths, *_running_in(scene, get, name)))
     return Joints(*(np.stack(parts, axis=-1) for parts in zip(*columns, strict=True)))
 

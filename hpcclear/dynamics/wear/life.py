@@ -201,10 +201,8 @@ def _jump(
     gone = here.work + length * half.rate
     clearance = joints.worn(gone)[0]
     allowed = plan.tolerance * clearance
-    apart, open_ = (
-        joints.grown(here.work, 0.5 * length * one)
-        for one in (np.abs(half.rate - here.rate), np.hypot(half.rate_limit, here.rate_limit))
-    )
+    rates = np.abs(half.rate - here.rate), np.hypot(half.rate_limit, here.rate_limit)
+    apart, open_ = (joints.grown(here.work, 0.5 * length * one) for one in rates)
     error = float((np.maximum(apart - open_, 0.0) / allowed).max())
     shifted, unknown = _shifted(joints, relief, here, half, length)
     error = max(error, float((np.maximum(shifted - unknown, 0.0) / allowed).max()))

@@ -77,10 +77,9 @@ class Relief:
         """Curvature of grooves over that of the clearance circle there at most: from 1 on a journal touches their edges."""
         if not self.size:
             return 0.0
-        deep, curved = (
-            one[..., 0, :, None] + one[..., 1, None, :]  # whichever places face each other
-            for one in (self.around(waves), self.around(waves * self._numbers**2))
-        )
+        both = self.around(waves), self.around(waves * self._numbers**2)
+        # whichever places face each other
+        deep, curved = (one[..., 0, :, None] + one[..., 1, None, :] for one in both)
         return float((curved / (clearance[..., None, None] + deep)).max())
 
 

@@ -76,11 +76,9 @@ class _Drawing(NamedTuple):
     def everything(self) -> None:
         """Lines first, then dimensions, then names, those with least room first."""
         mechanism, sheet = self.scene.linkage, self.sheet
-        colours = {
-            body.name: style.colour(self._colour(body.name, style.colour(k % 7)))
-            for k, body in enumerate(mechanism.bodies)
-        }
-        for body in mechanism.bodies:
+        colours = {}
+        for k, body in enumerate(mechanism.bodies):
+            colours[body.name] = style.colour(self._colour(body.name, style.colour(k % 7)))
             self._body(body.name, colours[body.name])
         self._ground()
         for joint in mechanism.joints:

@@ -42,10 +42,9 @@ def claims(content: Content) -> list[object] | None:
     verdicts = found["verdict"].values.tolist()
     counts = [verdicts.count(verdict) for verdict in Verdict]
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
-    rows = [
-        [f"{int(one['claim'])}. {text_in(one, 'text')}", _BADGES[Verdict(int(one["verdict"]))]]
-        for one in each(found, "claim")
-    ]
+    badges = [_BADGES[Verdict(verdict)] for verdict in verdicts]
+    texts = [f"{int(one['claim'])}. {text_in(one, 'text')}" for one in each(found, "claim")]
+    rows = [[text, badge] for text, badge in zip(texts, badges, strict=True)]
     title = "Claims of the paper; claims.nc has the numbers that decide"
     return [held, PageTable(["claim", "verdict"], rows, title)]
 
@@ -56,10 +55,8 @@ def designs_of_a_paper(content: Content) -> list[object]:
     if verified is None or "mean_paper" not in verified:
         return []
     printed = [text_in(k, "design") for k in each(verified, "design") if labels.is_printed(k)]
-    words = (
-        "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
-        "nothing was fitted to them."
-    )
+    unlike = "match neither the standard deviation nor the variance of f in this model"
+    words = f"The printed standard deviations {unlike}; nothing was fitted to them."
     columns = (*SIMULATED[:2], *_PRINTED)
     title = "Table 4: designs of the paper, by simulation with 95 % half-widths and as printed"
     return [words, table_of(verified, dict(zip(printed, printed, strict=True)), columns, title)]

@@ -43,11 +43,8 @@ def samples(found: Results, content: Content) -> Screen:
         for line in shown.values()
         if line.label in ("mean of f", "std. deviation of f", "P95 of f", "median of f")
     )
-    rows = [
-        ScreenRow(line.label, (line.text.partition(" (")[0], _interval(line)))
-        for line in shown.values()
-        if line.label.startswith(("P95 peak", "P99"))
-    ]
+    peaks = [line for label, line in shown.items() if label.startswith(("P95 peak", "P99"))]
+    rows = [ScreenRow(k.label, (k.text.partition(" (")[0], _interval(k))) for k in peaks]
     headline = "Every simulation failed"
     if np.isfinite(f).any():
         headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"

@@ -204,10 +204,10 @@ def _lifetimes(lives: Results) -> Iterator[list[str]]:
         return
     hours = float((cycles * each).min())
     for name, unit, beyond in ("lifetime", "revolutions", cycles), ("lifetime_hours", "h", hours):
-        texts = [
-            value + ("" if low == high == value else f" (95 % CI {low} to {high})")
-            for value, low, high in spread(lives, name, beyond)
-        ]
+        texts = []
+        for value, least, most in spread(lives, name, beyond):
+            within = "" if least == most == value else f" (95 % CI {least} to {most})"
+            texts.append(value + within)
         text = "median {}; 5th percentile {}; 95th percentile {}".format(*texts)
         yield [f"service life, {unit}", text]
     for name in lives["joint"].values if "exceedance" in lives else ():

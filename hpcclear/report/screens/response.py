@@ -17,12 +17,10 @@ def screen(response: Results, content: Content) -> Screen:
     name = next(name for name, one in content.responses.items() if one is response)
     status = Status(int(response["status"]))
     if not status.valid:
-        said = str(response.attrs.get("ended", status.message))
+        said = f"The simulation failed: {response.attrs.get('ended', status.message)}"
+        trust = (red(status.remedy, "bearings"),)
         return Screen(
-            f"The simulation failed: {said}",
-            doubt="no number of it is a result",
-            trust=(red(status.remedy, "bearings"),),
-            steps=(status.remedy,),
+            said, doubt="no number of it is a result", trust=trust, steps=(status.remedy,)
         )
     loads = bearings.bearings(response)
     header = ("bearing", "peak force", "at crank angle", "mean force", "contact")

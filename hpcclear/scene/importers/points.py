@@ -126,11 +126,8 @@ def summary(content: Content, drawing: Drawing) -> list[tuple[str, str]]:
     rows = mechanism["joints"].items()
     kinds = [f"{name} ({'guide' if row['kind'] == 'slide' else 'pin'})" for name, row in rows]
     stated = "" if drawing.speeds else ", a placeholder: the file states no drive"
-    lines = [
-        ("bodies", listed(mechanism["bodies"])),
-        ("joints", listed(kinds)),
-        ("drives", listed(drives) + stated + _repeating(mechanism["drives"])),
-    ]
+    driven = listed(drives) + stated + _repeating(mechanism["drives"])
+    lines = [("bodies", listed(mechanism["bodies"])), ("joints", listed(kinds)), ("drives", driven)]
     lengths = [
         (math.dist(a[1:3], b[1:3]), body, a.name, b.name)
         for body, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)

@@ -93,10 +93,8 @@ def _grows_with_clearance(found: SensitivityEvidence) -> Finding:
     mean, error = found.result["mean_objective"], found.result["mean_objective_error"]
     step = np.diff(mean)
     allowed = SURE * np.hypot(error[1:], error[:-1])
-    text = (
-        f"mean f over the box from {mean[0]:.3g} to {mean[-1]:.3g}; smallest increment "
-        f"{step.min():.2g}, significant above {allowed[step.argmin()]:.2g}"
-    )
+    least = f"{step.min():.2g}, significant above {allowed[step.argmin()]:.2g}"
+    text = f"mean f over the box from {mean[0]:.3g} to {mean[-1]:.3g}; smallest increment {least}"
     return verdict(step > allowed, step < -allowed), text
 
 

@@ -57,13 +57,10 @@ class Interpretation:
 
 def applies(scene: Scene) -> bool:
     """Whether the scene is the paper's and requests the comparison."""
-    contact = scene.effects.contact
-    return (
-        scene.required_study.verification.audit_samples > 0
-        and contact is not None
-        and contact.law == "lankarani-nikravesh"
-        and bool(printed_designs(scene))
-    )
+    contact, verification = scene.effects.contact, scene.required_study.verification
+    if contact is None or contact.law != "lankarani-nikravesh":
+        return False
+    return verification.audit_samples > 0 and bool(printed_designs(scene))
 
 
 def simulations(scene: Scene) -> tuple[int, int]:
