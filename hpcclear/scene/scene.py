@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import tomli_w
@@ -30,8 +29,6 @@ from hpcclear.scene.study import Study
 from hpcclear.scene.syntax import DEEPEST, file_text, parse
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.variables import StudyVariable
-
-Whole = TypeVar("Whole", bound=SceneTables)
 
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 
@@ -77,7 +74,7 @@ def load_scene(
         check_trust(content, "mapping" if text is None else str(source))
     if text is not None and not own_plugins:
         content = with_texts(content, lambda module: _beside(folder, module))
-    scene = scene_of(Scene, content)
+    scene = scene_of(content)
     scene._readings = (*scene.readings, *read_as)
     # results carry what was set, and the values of files: whoever has one needs nothing else
     notes = [*(f"set: {one}" for one in overrides), *map(str, read_as)]
@@ -189,7 +186,7 @@ class Scene(ConsistentTables):
         """TOML text of the resolved content, quantities as they were written; loading it gives an equal scene."""
         content = describing.as_written(self)
         with contextlib.suppress(InputError):
-            if scene_of(Scene, content) == self:
+            if scene_of(content) == self:
                 return tomli_w.dumps(content, multiline_strings=True)
         return tomli_w.dumps(self.resolved(), multiline_strings=True)
 
@@ -213,7 +210,7 @@ class Scene(ConsistentTables):
             if not dotted(path):
                 raise InputError("path", path, "is no dotted path", "Write mechanism.rod.mass, say")
             content = entry_replaced(content, path, value)
-        result = scene_of(Scene, content, self)
+        result = scene_of(content, self)
         known = {one.entry for one in result._readings}
         tables = tuple(path.rpartition(".")[0] + "." for path in altered)
         result._readings += tuple(  # that what stands beside a change does not alter; files are not opened again
@@ -229,7 +226,7 @@ class Scene(ConsistentTables):
         return hash(self.hash)
 
 
-def scene_of(kind: type[Whole], content: Content, before: SceneTables | None = None) -> Whole:
+def scene_of(content: Content, before: Scene | None = None) -> Scene:
     """The scene of a file's tables, with the readings of its units; raises InputError as `load_scene`.
 
     `before`: the scene that was changed, whose numbers stay as they were written.
@@ -245,10 +242,10 @@ def scene_of(kind: type[Whole], content: Content, before: SceneTables | None = N
         explained(content),
     ):
         with reading(texts):
-            scene = kind.model_validate(content)
+            scene = Scene.model_validate(content)
         rows = {name: {"version": version} for name, version in sorted(packages.items())}
         if rows != content.get("plugins", {}).get("packages", {}):
-            scene = kind.model_validate(replace(content, "plugins.packages", rows))
+            scene = Scene.model_validate(replace(content, "plugins.packages", rows))
         own = set[object](before.written) if before else set(_numbers_in(content))
         kept = [
             k for k, text in texts.items() if is_written_in(text) or (k if before else k[0]) in own
@@ -361,7 +358,7 @@ def _check_corner(
 
 
 def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts: Texts) -> Scene:
-    scene = scene_of(Scene, content)
+    scene = scene_of(content)
     scene._text, scene._readings, scene._texts = text, readings, texts
     return scene
 

@@ -224,7 +224,7 @@ class Off:
                 content = replace(content, path, value)
         if scene.study is not None:
             content["study"] = self._study(scene, content["study"])
-        return scene_of(Scene, content, scene)
+        return scene_of(content, scene)
 
     def _study(self, scene: Scene, content: Content) -> Content:
         """The study's table without the paths that are gone, nor names that drive nothing."""

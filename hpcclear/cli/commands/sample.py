@@ -1,6 +1,5 @@
 """`sample`: many designs of a scene, in parts as well."""
 
-from functools import partial
 from pathlib import Path
 
 from hpcclear.base.errors import InputError
@@ -69,8 +68,9 @@ def run(
             found = run_statistics(scene, place, ranks, raw=kept, options=how.options())
             describe_run(found, "statistics")
         else:
-            run = partial(run_sample, scene, place, ranks, options=how.options())
-            found = run(table=points, part=chosen)
+            found = run_sample(
+                scene, place, ranks, table=points, part=chosen, options=how.options()
+            )
             describe_run(found, "samples", shares(found.content, levels))
 
 

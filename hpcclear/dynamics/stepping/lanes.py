@@ -88,15 +88,6 @@ def end_revolutions(special, numbers, block, queue, method, W):
 
 
 @lane_function
-def ask_explicit(address, block, method):
-    """One step of the pair on every lane, by `steps.explicit_code`."""
-    arrays = (
-        method.numbers, block.work, method.settings, method.weights, method.tables, method.measures
-    )  # fmt: skip
-    call_at(address, arrays)
-
-
-@lane_function
 def advance(W, codes, block, queue, method, record, memory, budget):
     """Take at most `budget` block steps. Returns whether lanes are running."""
     if W == 1:
@@ -111,7 +102,8 @@ def advance(W, codes, block, queue, method, record, memory, budget):
         choose_step(rules, work, block.par, W)
         stiff = settle_methods(memory, settings, work, W)
         if stiff < running:
-            ask_explicit(codes.explicit, block, method)
+            of_pair = numbers, work, settings, method.weights, method.tables, method.measures
+            call_at(codes.explicit, of_pair)
         if stiff > 0.0:
             ask_implicit(codes.implicit, numbers, block, method, memory)
         running += judge_steps(codes.special, rules, n, numbers, block, queue, method, W)

@@ -37,18 +37,13 @@ class PrescribedSamples:
 
     def run(self, par: Array, start: Start) -> Outcome:
         """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""
-        return self._problem.marked(Outcome(_outcomes(self._problem, par)), par, start)
-
-
-def _outcomes(problem: Problem, par: Array) -> Array:
-    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, contact or work, which only a response has."""
-    rows = np.zeros((len(par), Outcome.size))
-    revolutions = problem.transient + problem.averaged
-    rows[:, Outcome.spread] = 0.0 if problem.averaged > 1 else np.nan
-    rows[:, Outcome.revolutions] = revolutions
-    rows[:, Outcome.time] = revolutions * par[:, at.PERIOD]
-    works = Outcome.total + at.WORKS
-    rows[:, works : works + 4] = np.nan
-    held = slice(Outcome.peak_moment, Outcome.peak_acceleration + 1)
-    rows[:, held] = par[:, at.HELD_MOMENT : at.HELD_PEAK + 1]
-    return rows
+        rows, problem = np.zeros((len(par), Outcome.size)), self._problem
+        revolutions = problem.transient + problem.averaged
+        rows[:, Outcome.spread] = 0.0 if problem.averaged > 1 else np.nan
+        rows[:, Outcome.revolutions] = revolutions
+        rows[:, Outcome.time] = revolutions * par[:, at.PERIOD]
+        works = Outcome.total + at.WORKS
+        rows[:, works : works + 4] = np.nan  # no gap, contact or work, which only a response has
+        held = slice(Outcome.peak_moment, Outcome.peak_acceleration + 1)
+        rows[:, held] = par[:, at.HELD_MOMENT : at.HELD_PEAK + 1]
+        return problem.marked(Outcome(rows), par, start)
