@@ -53,12 +53,11 @@ _SINGLE: dict[str, Unit] = {
 
 def _prefixed(prefixes: dict[str, int], unmeant: tuple[str, ...]) -> dict[str, Unit]:
     """Units with prefixes, but for those that nobody means."""
-    return {
-        prefix + symbol: (size * Fraction(10) ** exponent, powers)
-        for symbol, (size, powers) in _BASES.items()
-        for prefix, exponent in prefixes.items()
-        if prefix + symbol not in unmeant
-    }
+    made: dict[str, Unit] = {}
+    for symbol, (size, powers) in _BASES.items():
+        for prefix, exponent in prefixes.items():
+            made[prefix + symbol] = size * Fraction(10) ** exponent, powers
+    return {name: unit for name, unit in made.items() if name not in unmeant}
 
 
 UNITS: dict[str, Unit] = _SINGLE | _prefixed(_PREFIXES, ("Mm", "Gg", "Grad", "hbar"))

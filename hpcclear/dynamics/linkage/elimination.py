@@ -47,12 +47,8 @@ class Elimination:
         self.block = block
         self.inverse = inverse
         self.passed = passed
-        self.entries = {
-            (i, j): writer.let(f"k_{i}_{j}", matrix[i, j])
-            for i in block
-            for j in block
-            if i <= j and matrix.get((i, j), ZERO)
-        }
+        places = [(i, j) for i in block for j in block if i <= j and matrix.get((i, j), ZERO)]
+        self.entries = {(i, j): writer.let(f"k_{i}_{j}", matrix[i, j]) for i, j in places}
         self.small = len(block) <= 2 and not held
         self.pivots: list[tuple[int, Term, dict[int, Term], dict[int, Term]]] = []
         if self.small and len(block) == 2:

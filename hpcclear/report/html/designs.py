@@ -98,11 +98,10 @@ _WORDS = "By simulation, ± half-width of the 95 % confidence interval. In brack
 def designs(verified: Results, content: Content) -> list[object]:
     """What was found, a table a case with each distinct design once."""
     shown = roles(verified)
-    tables: list[object] = [
-        table_of(verified, words, SIMULATED, caption)
-        for case, words in shown.items()
-        if words and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
-    ]
+    tables: list[object] = []
+    for case, words in shown.items():
+        caption = f"Case {case}: baseline and optimised designs".replace("  ", " ")
+        tables += [table_of(verified, words, SIMULATED, caption)] if words else []
     if not tables:
         every = {name: name for name in texts_in(verified, "design")}
         tables = [table_of(verified, every, SIMULATED, "Designs")]

@@ -275,10 +275,8 @@ def _bars(of: Recommended) -> tuple[list[ShareBar], str]:
     if found is None or "sobol_total" not in found:
         return [], ""
     values = (found[name].values for name in ("sobol_total", "sobol_total_error"))
-    bars = [
-        ShareBar(name, float(share), scatter.HALF_WIDTH * float(error))
-        for name, share, error in zip(texts_in(found, "parameter"), *values, strict=True)
-        if np.isfinite(share)
-    ]
+    rows = zip(texts_in(found, "parameter"), *values, strict=True)
+    known = [row for row in rows if np.isfinite(row[1])]
+    bars = [ShareBar(name, float(s), scatter.HALF_WIDTH * float(e)) for name, s, e in known]
     words = "Total Sobol indices over the ranges of the study."
     return sorted(bars, key=lambda one: -one.share), words
