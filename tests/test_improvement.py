@@ -1,5 +1,6 @@
 """Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import moocore
@@ -51,7 +52,8 @@ def known_of(designs, values, error, excess=None):
     none = np.empty((len(designs), 0))
     broken = none if excess is None else excess(designs)[:, None]
     errors = np.tile([error, 1e-9][: values.shape[1]], (len(designs), 1))
-    return Known(designs, values, errors, broken, np.full(broken.shape, 1e-3))
+    shifts = np.zeros((values.shape[1], len(designs), 1))
+    return Known(designs, values, errors, broken, np.full(broken.shape, 1e-3), shifts)
 
 
 def space_of(snap=lambda x: x, constraints=0):
@@ -165,14 +167,30 @@ def test_more_simulations_are_worth_most_where_they_may_change_the_choice():
     rng = np.random.default_rng(4)
     designs = np.vstack([np.linspace(0.0, 1.0, 8), np.linspace(-2.0, 2.0, 8)]).T
     values = np.array([1.0, 1.02, 3.0, 3.1, 3.2, 3.1, 3.0, 2.9])[:, None]
-    known = Known(designs, values, np.full((8, 1), 0.3), np.empty((8, 0)), np.empty((8, 0)))
-    beliefs = Beliefs(known, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
+    beliefs = Beliefs(
+        known_of(designs, values, 0.3), Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng
+    )
     worth = improvement.replications(beliefs, np.ones(1))
     assert (worth >= 0.0).all()
     assert set(np.argsort(worth)[-2:].tolist()) == {0, 1}
-    exact = Known(designs, values, np.full((8, 1), 1e-9), np.empty((8, 0)), np.empty((8, 0)))
-    sure = Beliefs(exact, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
+    sure = Beliefs(
+        known_of(designs, values, 1e-9), Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng
+    )
     assert improvement.replications(sure, np.ones(1)).max() < 0.01 * worth.max()
+
+
+def test_what_flatters_a_region_is_not_believed_of_it():
+    """Designs of one half share an error, which twelve replicates show: no step of f is seen in it."""
+    rng = np.random.default_rng(9)
+    designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    truth, left = 0.1 * designs[:, :1], designs[:, :1] < 0.5
+    known = known_of(designs, truth - 0.3 * left, 0.01)
+    shift, errors = rng.standard_normal(12), np.where(left, 0.3, 0.01)
+    shared = replace(known, errors=errors, shifts=(errors * shift / np.linalg.norm(shift))[None])
+    space = Space(BOUNDS, np.eye(1), (None,), np.empty(0))
+    for one, off in ((known, 0.3), (shared, 0.0)):
+        steps = Beliefs(one, space, rng).believed - truth
+        assert abs(steps[~left].mean() - steps[left].mean() - off) < 0.05
 
 
 def test_constraints_are_kept():
@@ -248,12 +266,6 @@ def simulated(f, length, guesses=()):
     one = Simulated(run, run.study.cases[0], guesses, [choice] * 2)
     one.made = [np.stack([f, 0.0 * f]), np.stack([f + 0.5, 0.0 * f])[..., :length]]
     return one
-
-
-def test_designs_are_compared_by_points_that_both_have_met():
-    """f of one is that of the other and a constant: their difference is known, however few points one has."""
-    f = np.random.default_rng(7).normal(1.0, 0.1, (16, 32))
-    np.testing.assert_allclose(simulated(f, 4).apart(0, np.array([1.0, 0.0])), 0.0, atol=1e-12)
 
 
 def test_scatter_that_the_surrogate_explains_needs_no_simulations():

@@ -3,14 +3,21 @@
 import numpy as np
 import pytest
 from margins import at_least, at_most
-from scipy.optimize import minimize
-from scipy.stats import qmc
+from scipy.optimize import approx_fprime, minimize
+from scipy.spatial.distance import cdist
+from scipy.stats import multivariate_normal, qmc
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.fitting import KrigingMethod, fit_kriging
-from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPONENTIAL
+from hpcclear.statistics.surrogate.kernels import (
+    KERNELS,
+    MATERN,
+    SQUARED_EXPONENTIAL,
+    Errors,
+    correlation,
+)
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -99,6 +106,34 @@ def test_likelihood_and_gradient_are_those_of_scikit_learn(dims, count, noise, k
     found, slopes = negative_likelihood(theta, points - 0.5, values, kernel)
     assert found == pytest.approx(-value, rel=1e-6)
     np.testing.assert_allclose(slopes, -gradient, rtol=1e-6, atol=1e-6 * abs(gradient).max())
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_errors_in_common_are_part_of_the_likelihood_and_of_what_is_known(kernel):
+    """Values by the normal density, slopes by differences; variances of differences by the joint covariance."""
+    rng = np.random.default_rng(4)
+    points, values, shifts = (
+        rng.random((30, 2)),
+        rng.standard_normal(30),
+        rng.standard_normal((30, 8)),
+    )
+    errors = Errors(rng.uniform(0.5, 2.0, 30), 0.05 * shifts @ shifts.T)
+    theta = np.log([2.0, 0.4, 0.9, 0.01])
+    squares = cdist(points / [0.4, 0.9], points / [0.4, 0.9], "sqeuclidean")
+    whole = 2.0 * correlation(squares, kernel) + 0.01 * np.diag(errors.own) + errors.common
+    found, slopes = negative_likelihood(theta, points - 0.5, values, kernel, errors)
+    assert found == pytest.approx(-multivariate_normal(cov=whole).logpdf(values), rel=1e-9)
+    steps = approx_fprime(
+        theta, lambda at: negative_likelihood(at, points - 0.5, values, kernel, errors)[0]
+    )
+    np.testing.assert_allclose(slopes, steps, rtol=1e-4, atol=1e-4)
+    model = fit_kriging(
+        points, values, np.tile([0.0, 1.0], (2, 1)), rng=rng, kernel=kernel, errors=errors
+    )
+    joint = model.covariance(points[:6])
+    apart = np.diag(joint) + joint[0, 0] - 2.0 * joint[0]
+    np.testing.assert_allclose(model.apart(points[:6], points[0]), apart, atol=1e-9)
+    np.testing.assert_allclose(model.apart(points[:6]), 0.0, atol=1e-9)
 
 
 def of_many_points(points, seed=5):

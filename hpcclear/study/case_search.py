@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Sequence
 from functools import partial
-from itertools import compress
 
 import moocore
 import numpy as np
@@ -181,9 +180,7 @@ class CaseSearch:
         if direction is None:
             return 0, 0.0
         sizes = self.designs.sizes[: len(beliefs.known.designs)]
-        merit = np.where(beliefs.allowed, beliefs.believed @ direction, np.inf)
-        apart = self._apart(int(merit.argmin()), direction)[: len(sizes)]
-        worth = improvement.replications(beliefs, direction, apart) / np.maximum(sizes, 1)
+        worth = improvement.replications(beliefs, direction) / np.maximum(sizes, 1)
         worth[sizes >= self._size] = 0.0
         worth[[row for row in taken if row < len(worth)]] = 0.0
         row = int(worth.argmax())
@@ -211,7 +208,8 @@ class CaseSearch:
         (values, errors), (excess, doubts) = (
             np.moveaxis(part, 1, 0) for part in np.split(found, [count], axis=2)
         )
-        return Known(self.designs.places(self._space.bounds), values, errors, excess, doubts)
+        places, shifts = self.designs.places(self._space.bounds), self.designs.shifts()[:count]
+        return Known(places, values, errors, excess, doubts, shifts)
 
     # -- probabilities -------------------------------------------------------------------------------
 
@@ -285,7 +283,7 @@ class CaseSearch:
             rows += kept[front[cut(means[front], max(designs, means.shape[1]))]].tolist()
         rows = list(dict.fromkeys(rows))
         merit = beliefs.believed @ main
-        spreads = np.sqrt(beliefs.variances(known) @ main**2) + self._apart(rows[0], main)
+        spreads = np.sqrt(beliefs.apart(known, known[rows[0]]) @ main**2)
         bold = merit - BOLD * spreads
         for row in kept[np.argsort(bold[kept], kind="stable")]:
             if bold[row] > merit[rows[0]]:
@@ -314,12 +312,6 @@ class CaseSearch:
                 taken = np.vstack([taken, point])
         fresh = choices(self._run, self._case.name, taken[len(rows) :])
         return distinct([*(self.designs.choices[row] for row in rows), *fresh])
-
-    def _apart(self, row: int, direction: Array) -> Array:
-        """Standard errors of the differences of all designs from one in a direction, (n,); 0 in what is exact."""
-        if all(goal.exact for goal in compress(self._case.goals, direction != 0.0)):
-            return np.zeros(int((self.designs.sizes > 0).sum()))
-        return self.designs.apart(row, direction)
 
     def _margins(self, aim: float, errors: Array | None = None) -> Array:
         """By how much the constraints are kept where a share of the allowed probability is taken, (constraints,); of other

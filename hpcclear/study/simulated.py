@@ -92,14 +92,10 @@ class Simulated:
         shifts = self.of(row, self.made[row].shape[2])[1][: len(direction)]
         return float(np.nan_to_num(spread((direction @ shifts)[None]), nan=np.inf)[0])
 
-    def apart(self, row: int, direction: Array) -> Array:
-        """Standard errors of the differences of all simulated designs from one, in a direction, (n,): the same scatter is in
-        both, but less so the more they differ, which no model of the values sees."""
-        sizes = [one.shape[2] for one in self.made if one.size]
-        both = [(k, min(size, sizes[row])) for k, size in enumerate(sizes)]  # points in common
-        shifts = np.array([self.of(k, n)[1] - self.of(row, n)[1] for k, n in both])
-        own = shifts[:, : len(direction)]
-        return np.nan_to_num(spread(np.einsum("knr,n->kr", own, direction)))
+    def shifts(self) -> Array:
+        """By how much each replicate shifts what all designs come to, (k, n, replicates)."""
+        each = [self.of(row, length)[1] for row, length in enumerate(self.sizes)]
+        return np.moveaxis(np.array(each), 1, 0)
 
     def of(self, row: int, length: int) -> Asked:
         """A design by so many points of each replicate, less what the surrogate says that more points would change."""

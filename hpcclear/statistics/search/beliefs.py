@@ -1,24 +1,31 @@
 """Models of objectives and constraints over designs that were evaluated with errors, and of a trend that a cheaper model has.
 
+All designs meet the same scatter, so that they have most of an error in common: neighbours nearly all of it, others less. What
+each replicate shifts says how much. A model that knew variances only would take for true what few simulations flatter
+throughout a region.
+
 Sources: J. Sacks et al., "Design and analysis of computer experiments", Statistical Science 4 (1989),
 doi:10.1214/ss/1177012413; of a trend M. C. Kennedy and A. O'Hagan, "Predicting the output from a complex computer code when
-fast approximations are available", Biometrika 87 (2000), doi:10.1093/biomet/87.1.1.
+fast approximations are available", Biometrika 87 (2000), doi:10.1093/biomet/87.1.1; of common errors X. Chen, B. E. Ankenman
+and B. L. Nelson, "The effects of common random numbers on stochastic kriging metamodels", ACM Trans. Model. Comput. Simul.
+22 (2012), doi:10.1145/2133390.2133391.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.kernels import MATERN
+from hpcclear.statistics.surrogate.kernels import MATERN, Errors
 from hpcclear.statistics.surrogate.kriging import Kriging
 
-NOISE = 1e-3, 2.0
-"""Between these factors on the variance of known errors is the noise variance of a model. Designs that meet the same scatter
-share most of their errors, which then are no noise between them."""
+NOISE, APART = (1e-3, 2.0), (0.1, 2.0)
+"""Between these factors on the variance of known errors is what a design has for itself, where nothing is known of what errors
+have in common, and where that is known from replicates: too few of them to know it better."""
 
 FLAT = 1e-9
 """Changes of a trend over its size that are no more than round-off: a slope of them would have no digit of the values left."""
@@ -48,6 +55,8 @@ class Known:
     excess: Array
     excess_errors: Array
     """excess and excess_errors, shape (n, c): by how much each constraint is broken, at most 0 where it is kept."""
+    shifts: Array
+    """By how much each of r replicates shifts objectives, (m, n, r). What constraints have in common is left to margins."""
 
 
 @dataclass(frozen=True)
@@ -101,22 +110,19 @@ class Beliefs:
         self, known: Known, space: Space, rng: np.random.Generator, before: "Beliefs | None" = None
     ) -> None:
         self.known, self.space, self.rng = known, space, rng
-        count = len(space.exact)
-        none = [lambda points: np.zeros(len(points))] * (count + known.excess.shape[1])
-        trends = space.trends or none
-
-        def model(values: Array, errors: Array, trend: OfDesigns, last: Trended | None) -> Trended:
-            like = last.rest if last else None
-            return _trended(known.designs, values, errors, trend, space.bounds, rng, like)
-
-        models: Sequence[Trended | None] = before.models if before else [None] * count
-        each = zip(space.exact, known.values.T, known.errors.T, trends[:count], models, strict=True)
-        self.models: list[Trended | None] = [None if exact else model(*one) for exact, *one in each]
-        limits: Sequence[Trended | None] = (
-            before.limits if before else [None] * known.excess.shape[1]
-        )
-        kept = zip(known.excess.T, known.excess_errors.T, trends[count:], limits, strict=True)
-        self.limits: list[Trended] = [model(*one) for one in kept]
+        count, width = len(space.exact), known.excess.shape[1]
+        none: list[Trended | None] = [None] * (count + width)
+        found = list[Trended | None]()
+        trends = space.trends or [_nothing] * len(none)
+        for exact, values, errors, shifts, trend, last in zip(
+            [*space.exact, *[None] * width], np.hstack([known.values, known.excess]).T,
+            np.hstack([known.errors, known.excess_errors]).T, [*known.shifts, *[None] * width], trends,
+            [*before.models, *before.limits] if before else none, strict=True,
+        ):  # fmt: skip
+            made = _Evaluated(known.designs, values, errors, shifts)
+            found.append(None if exact else _trended(made, space, trend, rng, last))
+        self.models: list[Trended | None] = found[:count]
+        self.limits: list[Trended] = [one for one in found[count:] if one]
         self.pending = known.designs[:0]
         self.finite = np.isfinite(known.values).all(axis=1) & np.isfinite(known.excess).all(axis=1)
         self.believed = self.means(known.designs)
@@ -136,9 +142,16 @@ class Beliefs:
             [nothing if model is None else model.variance(points) for model in self.models]
         )
 
+    def apart(self, points: Array, one: Array | None = None) -> Array:
+        """The same of the differences from one design, (d,), or from the nearest that is known, (n, d) to (n, m)."""
+        nothing = np.zeros(len(points))
+        return np.column_stack(
+            [nothing if model is None else model.rest.apart(points, one) for model in self.models]
+        )
+
     @property
     def noise(self) -> Array:
-        """Variance of the error of one more design's objectives, (m,)."""
+        """Variance of what the error of one more design's objectives has for itself, (m,)."""
         return np.array([0.0 if one is None else _noise(one.rest) for one in self.models])
 
     def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
@@ -160,74 +173,93 @@ class Beliefs:
         self.limits = [_extended(one, point) for one in self.limits]
         self.pending = np.vstack([self.pending, point])
 
-    def front(self) -> Array:
-        """Objectives of all designs that are likely to keep the constraints, also of those that are to be evaluated, (k, m)."""
+    def front(self) -> tuple[Array, Array]:
+        """All designs that are likely to keep the constraints, (k, d), also those that are to be evaluated, and their
+        objectives, (k, m)."""
         later = self.pending[self.feasible(self.pending) >= LIKELY]
-        return np.vstack([self.believed[self.allowed], self.means(later)])
+        designs = np.vstack([self.known.designs[self.allowed], later])
+        return designs, np.vstack([self.believed[self.allowed], self.means(later)])
+
+
+def _nothing(points: Array) -> Array:
+    """The trend where there is none."""
+    return np.zeros(len(points))
+
+
+class _Evaluated(NamedTuple):
+    """One objective or constraint of n designs, as `Known` has them."""
+
+    designs: Array
+    values: Array
+    errors: Array
+    shifts: Array | None
 
 
 def _trended(
-    designs: Array,
-    values: Array,
-    errors: Array,
-    trend: OfDesigns,
-    bounds: Array,
-    rng: np.random.Generator,
-    like: Kriging | None,
+    made: _Evaluated, space: Space, trend: OfDesigns, rng: np.random.Generator, last: Trended | None
 ) -> Trended:
     """A model with the trend or without it: the one with the smaller leave-one-out errors."""
-    guess, known = trend(designs), np.isfinite(values)
+    guess, known = trend(made.designs), np.isfinite(made.values)
     steps = guess[known] - guess[known].mean() if known.any() else guess[known]
     squares = float(steps @ steps)
     moves = squares > FLAT**2 * float(np.square(guess[known]).sum())
-    slopes = [0.0, float(steps @ values[known]) / squares] if moves else [0.0]
-    made = [
-        Trended(_fitted(designs, values - slope * guess, errors, bounds, rng, like), slope, trend)
+    slopes = [0.0, float(steps @ made.values[known]) / squares] if moves else [0.0]
+    like = last.rest if last else None
+    models = [
+        Trended(_fitted(made._replace(values=made.values - slope * guess), space.bounds, rng, like), slope, trend)
         for slope in slopes
-    ]
-    return min(made, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
+    ]  # fmt: skip
+    return min(models, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
 
 
 def _fitted(
-    designs: Array,
-    values: Array,
-    errors: Array,
-    bounds: Array,
-    rng: np.random.Generator,
-    like: Kriging | None,
+    made: _Evaluated, bounds: Array, rng: np.random.Generator, like: Kriging | None
 ) -> Kriging:
+    designs, values = made.designs, made.values
     known = np.isfinite(values)
     size = float(np.std(values[known])) if known.any() else 0.0
     with np.errstate(invalid="ignore"):
-        squares = np.where(errors > 0.0, errors, np.nan)[known] ** 2
+        squares = np.where(made.errors > 0.0, made.errors, np.nan)[known] ** 2
     if not (size > 0.0 and np.isfinite(squares).any()):
         return fit_kriging(
             designs, values, bounds, rng=rng, restarts=like is None, kernel=MATERN, like=like
         )
     middle = float(np.nanmedian(squares))
-    shares = np.ones(len(values))
-    shares[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
-    low, high = (max(factor * middle / size**2, 1e-8) for factor in NOISE)
+    own = np.ones(len(values))
+    own[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
+    common = _common(made)
+    factors = NOISE if common is None else APART
+    low, high = (max(factor * middle / size**2, 1e-8) for factor in factors)
     return fit_kriging(
         designs, values, bounds, rng=rng, restarts=like is None, lengths=LENGTHS, kernel=MATERN,
-        noise=(low, max(high, 10.0 * low)), shares=shares, like=like,
+        noise=(low, max(high, 10.0 * low)), errors=Errors(own, common), like=like,
     )  # fmt: skip
 
 
+def _common(made: _Evaluated) -> Array | None:
+    """Covariance of what errors have in common, (n, n), by what replicates shift; None where that is not known."""
+    if made.shifts is None:
+        return None
+    shifts = np.nan_to_num(made.shifts)
+    sizes = np.sqrt(np.square(shifts).sum(axis=1))
+    shifts *= (np.nan_to_num(made.errors) / np.where(sizes > 0.0, sizes, np.inf))[:, None]
+    return np.asarray(shifts @ shifts.T)
+
+
 def _noise(model: Kriging) -> float:
-    share = 1.0 if model.shares is None else float(np.median(model.shares))
+    share = float(np.median(model.errors.own)) if model.errors else 1.0
     return float(model.scale**2 * model.noise_variance * share)
 
 
 def _extended(model: Trended, point: Array) -> Trended:
     """A model with one more value, the one that it expects: which changes no other expectation, and has no weight."""
     rest = model.rest
-    shares = None if rest.shares is None else np.append(rest.shares, np.median(rest.shares))
+    errors = rest.errors and rest.errors.extended()
     more = replace(
         rest,
         inputs=np.vstack([rest.inputs, point]),
         values=np.append(rest.values, rest.predict(point[None])),
         alpha=np.append(rest.alpha, 0.0),
-        shares=shares,
+        errors=errors,
     )
     return replace(model, rest=more)

@@ -3,11 +3,12 @@
 Each objective and constraint gets one Kriging model over designs, with the kernel of Matern and the known error of each value:
 a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
 probability that it keeps the constraints, and less where its own error hides what is not known yet (augmented expected
-improvement); more simulations of a known design are worth what they may change in which design is
-taken for the best (knowledge gradient). Both are compared by simulation: few for a new design at first, more for
-contenders only ("replication or exploration"). Of several designs at a time each takes those before it for evaluated, at
-the value that is expected (Kriging believer). Where no design is expected to win enough, draws of what is believed of all
-designs together say what is lost if none is simulated any more, and which may be the best (Thompson sampling).
+improvement); how it may differ from the best one counts, for what both have in common decides nothing. More simulations
+of a known design are worth what they may change in which design is taken for the best (knowledge gradient). Both are compared
+by simulation: few for a new design at first, more for contenders only ("replication or exploration"). Of several designs at a
+time each takes those before it for evaluated, at the value that is expected (Kriging believer). Where no design is expected to
+win enough, draws of what is believed of all designs together say what is lost if none is simulated any more, and which may be
+the best (Thompson sampling).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors D. Huang, T. T. Allen, W. I. Notz and N. Zeng,
@@ -112,24 +113,23 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     return points[rows], float(loss.mean())
 
 
-def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0) -> Array:
+def replications(beliefs: Beliefs, direction: Array) -> Array:
     """What twice the simulations of each known design are worth in a direction, (n,): by how much they are expected to better
-    the choice of the best design. `apart` are errors of their differences from the best that no model sees, (n,)."""
+    the choice of the best design, from which others differ by what they do not have in common."""
     rows = np.flatnonzero(beliefs.allowed)
     found = np.zeros(len(beliefs.known.designs))
     if len(rows) < 2:
         return found
     designs, own = beliefs.known.designs[rows], beliefs.believed[rows] @ direction
-    left = beliefs.variances(designs) @ direction**2
+    order = np.argsort(own)
+    left = beliefs.apart(designs, designs[order[0]]) @ direction**2
+    left[order[0]] = left[order[1]]
     noise = np.zeros(len(rows))
     for column, (model, weight) in enumerate(zip(beliefs.models, direction, strict=True)):
         if model is not None and weight:
             rest, places = model.rest, np.cumsum(np.isfinite(beliefs.known.values[:, column])) - 1
-            shares = 1.0 if rest.shares is None else rest.shares[places[rows]]
-            noise += weight**2 * rest.scale**2 * rest.noise_variance * shares
-    unseen = np.broadcast_to(apart, len(found))[rows] ** 2 / 2.0
-    moved = np.sqrt(left**2 / (left + noise + 1e-300) + unseen)
-    order = np.argsort(own)
+            noise += weight**2 * rest.error_variances[places[rows]]
+    moved = np.sqrt(left**2 / (left + noise + 1e-300))
     others = np.where(np.arange(len(own)) == order[0], own[order[1]], own[order[0]])
     worth = gain(others, own, moved) - np.maximum(others - own, 0.0)
     chance = beliefs.feasible(designs)
@@ -139,7 +139,7 @@ def replications(beliefs: Beliefs, direction: Array, apart: Array | float = 0.0)
 
 def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
     """What is expected to be won at points, (n, d) to (n,): in a direction, or of the hypervolume."""
-    front = beliefs.front()
+    designs, front = beliefs.front()
     if not len(front):  # nothing keeps the constraints: the nearest, by the worst of them
         means, _ = beliefs.shortfalls(beliefs.known.designs[beliefs.finite])
         least = float(means.max(axis=1).min(initial=np.inf))
@@ -154,8 +154,10 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
     weights = beliefs.rng.dirichlet(np.ones(front.shape[1]))
     noise = beliefs.rng.standard_normal((DRAWS, 1, front.shape[1]))
 
+    best = None if direction is None else designs[(front @ direction).argmin()]
+
     def function(points: Array) -> Array:
-        mean, deviation = beliefs.means(points), np.sqrt(beliefs.variances(points))
+        mean, deviation = beliefs.means(points), np.sqrt(beliefs.apart(points, best))
         if direction is not None:
             own, spread = mean @ direction, np.sqrt(deviation**2 @ direction**2)
             error = np.sqrt(beliefs.noise @ direction**2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.base.threads import one_thread
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Errors, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
 from hpcclear.statistics.surrogate.likelihood import maximise
@@ -57,7 +57,7 @@ def fit_kriging(
     lengths: tuple[float, float] = LENGTH_BOUNDS,
     kernel: Kernel = SQUARED_EXPONENTIAL,
     noise: tuple[float, float] | None = None,
-    shares: np.ndarray | None = None,
+    errors: Errors | None = None,
     like: Kriging | None = None,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
@@ -65,10 +65,9 @@ def fit_kriging(
     The points (n, d) are inside `bounds` (d, 2), where the model will answer. A value that is NaN marks a failed sample,
     which is left out and counted. `names`: of the inputs, x1, x2 and so on by default. The likelihood is maximised from
     `restarts` starting points besides the first, drawn by `rng`, with length scales (in the unit cube) between `lengths`, and
-    the noise variance, in units of the variance of the values, between those of `noise`. `shares` (n,): noise variance of
-    each value over that one, where the errors of values are known; else they are all alike. `like`: a model of nearly the same
-    values, whose length scales and variances are the first starting point. Raises InputError: points outside
-    the bounds, or fewer valid samples than parameters to fit (d + 3).
+    the noise variance, in units of the variance of the values, between those of `noise`. `errors`: what is known of those of
+    the values; else they are all alike. `like`: a model of nearly the same values, whose length scales and variances are the
+    first starting point. Raises InputError: points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     needed = points.shape[-1] + 3  # length scales, signal, noise, mean
@@ -80,7 +79,7 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    known = None if shares is None else np.asarray(shares, dtype=np.float64)[valid]
+    known = errors.of(valid, scale) if errors else None
     limits = noise or NOISE_BOUNDS
     dims = unit.shape[1]
     starts = [np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *limits)])]
@@ -91,10 +90,9 @@ def fit_kriging(
     seed = int(rng.integers(2**31))
     with one_thread():
         found = maximise(
-            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel,
-            shares=1.0 if known is None else known,
+            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, errors=known,
         )  # fmt: skip
     return Kriging(
         labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],
-        dropped=int((~valid).sum()), kernel=kernel, shares=known,
+        dropped=int((~valid).sum()), kernel=kernel, errors=known,
     )  # fmt: skip

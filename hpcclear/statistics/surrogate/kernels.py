@@ -7,11 +7,11 @@ Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine 
 M. L. Stein, "Interpolation of Spatial Data" (1999), section 2.7.
 """
 
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans, Integers
 
 Kernel = Literal["squared-exponential", "matern-5/2"]
 SQUARED_EXPONENTIAL: Kernel = "squared-exponential"
@@ -19,6 +19,31 @@ SQUARED_EXPONENTIAL: Kernel = "squared-exponential"
 MATERN: Kernel = "matern-5/2"
 """A function of the distance over all inputs, and no product over them."""
 KERNELS: tuple[Kernel, ...] = get_args(Kernel)
+
+
+class Errors(NamedTuple):
+    """What is known of the errors of n values."""
+
+    own: Array
+    """Variance of what each has for itself, over the noise variance that is sought, (n,)."""
+    common: Array | None = None
+    """Covariance of what they share, in squared units of the values, (n, n)."""
+
+    def of(self, rows: Integers | Booleans, scale: float = 1.0) -> "Errors":
+        """Those of some values, in units of `scale`."""
+        common = None if self.common is None else self.common[np.ix_(rows, rows)] / scale**2
+        return Errors(self.own[rows], common)
+
+    def extended(self) -> "Errors":
+        """Those of one more value, which shares nothing."""
+        common = None if self.common is None else np.pad(self.common, (0, 1))
+        return Errors(np.append(self.own, np.median(self.own)), common)
+
+    def added(self, covariance: Array, noise: float) -> None:
+        """Add them to a covariance matrix of the values, (n, n)."""
+        covariance[np.diag_indices_from(covariance)] += noise * self.own
+        if self.common is not None:
+            covariance += self.common
 
 
 def correlation(squares: Array, kernel: Kernel) -> Array:

@@ -23,7 +23,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel, correlation
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Errors, Kernel, correlation
 from hpcclear.statistics.surrogate.leaf import Columns, inside
 from hpcclear.statistics.surrogate.predictor import kernel_sum, matern_sum, pad
 
@@ -64,8 +64,8 @@ class Kriging:
     dropped: int = 0
     """Samples that had failed (NaN) and were left out of the fit."""
     kernel: Kernel = SQUARED_EXPONENTIAL
-    shares: np.ndarray | None = None
-    """Noise variance of each training value over `noise_variance`, (n,); not stored, for no prediction needs it."""
+    errors: Errors | None = None
+    """What is known of those of the training values, in units of ``scale``; not stored, for no prediction needs it."""
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "length_scales", "inputs", "values", "alpha"):
@@ -129,6 +129,22 @@ class Kriging:
         known = np.einsum("ij,ij->j", steps, steps)
         return self.scale**2 * np.maximum(self.signal_variance - known, 0.0)
 
+    def apart(self, points: np.ndarray, one: np.ndarray | None = None) -> np.ndarray:
+        """Kriging variance (n,) of the differences of the smooth part at points (n, d) from that at `one` (d,), or at the
+        nearest training point of each, in squared units of the training values."""
+        unit, inputs = self.to_unit(inside(points, self.names, self.lower, self.upper)), self._unit
+        cross = self._covariance(inputs, unit)
+        steps = solve_triangular(self._factor, cross, lower=True)
+        if one is None:
+            steps -= self._steps[:, cross.argmax(axis=0)]
+            shared = cross.max(axis=0)
+        else:
+            place = self.to_unit(one[None])
+            steps -= solve_triangular(self._factor, self._covariance(inputs, place), lower=True)
+            shared = self._covariance(unit, place)[:, 0]
+        left = 2.0 * (self.signal_variance - shared) - np.einsum("ij,ij->j", steps, steps)
+        return np.asarray(self.scale**2 * np.maximum(left, 0.0))
+
     def covariance(self, points: np.ndarray) -> np.ndarray:
         """Joint Kriging covariance (n, n) of the smooth part at points (n, d), in squared units of the training values."""
         unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
@@ -138,9 +154,27 @@ class Kriging:
         return np.asarray(self.scale**2 * (self._covariance(unit, unit) - known))
 
     @cached_property
+    def _unit(self) -> Array:
+        return self.to_unit(self.inputs)
+
+    @cached_property
+    def _steps(self) -> Array:
+        """What is known at the training points themselves, as `apart` takes it, (n, n)."""
+        return np.asarray(
+            solve_triangular(self._factor, self._covariance(self._unit, self._unit), lower=True)
+        )
+
+    @cached_property
     def _factor(self) -> Array:
         """Cholesky factor of the covariance of the training values."""
         return np.asarray(cholesky(self._noisy_covariance(), lower=True))
+
+    @property
+    def error_variances(self) -> Array:
+        """Variances of the errors of the training values, (n,), in squared units of these."""
+        matrix = np.zeros((len(self.values), len(self.values)))
+        (self.errors or Errors(np.ones(len(matrix)))).added(matrix, self.noise_variance)
+        return self.scale**2 * np.diag(matrix)
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).
@@ -155,8 +189,7 @@ class Kriging:
         """Covariance of the training values, in units of ``scale**2``."""
         unit = self.to_unit(self.inputs)
         matrix = self._covariance(unit, unit)
-        shares = 1.0 if self.shares is None else self.shares
-        matrix[np.diag_indices_from(matrix)] += self.noise_variance * shares
+        (self.errors or Errors(np.ones(len(unit)))).added(matrix, self.noise_variance)
         return matrix
 
     def _covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:

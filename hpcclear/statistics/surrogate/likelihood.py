@@ -25,6 +25,7 @@ from scipy.spatial.distance import cdist
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.statistics.surrogate.kernels import (
     SQUARED_EXPONENTIAL,
+    Errors,
     Kernel,
     correlation,
     with_slopes,
@@ -62,39 +63,39 @@ def maximise(
     seed: int,
     *,
     kernel: Kernel = SQUARED_EXPONENTIAL,
-    shares: Array | float = 1.0,
+    errors: Errors | None = None,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values (n,) of mean 0 at points (n, d) in the unit
     cube.
 
     The search begins from those that are `known`, (d + 2,) each in this order, and from further `restarts` by the seed, within
-    `bounds` (d + 2, 2). `shares` (n,): noise variance of each value over the one that is sought.
+    `bounds` (d + 2, 2). `errors`: what is known of those of the values; else they are all alike.
     """
-    tolerance = FLAT if np.ndim(shares) else None
-    shares = np.broadcast_to(shares, len(values))
+    tolerance = FLAT if errors else None
+    errors = errors or Errors(np.ones(len(values)))
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
     starts = [np.log(one) for one in known]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
     if len(parts) == 1:
-        top = _climbed(starts, limits, tolerance, centred, values, kernel, shares)
+        top = _climbed(starts, limits, tolerance, centred, values, kernel, errors)
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
         first = parts[0]
         top = _climbed(
-            starts, limits, tolerance, centred[first], values[first], kernel, shares[first]
+            starts, limits, tolerance, centred[first], values[first], kernel, errors.of(first)
         )
         top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
         for part in parts[1:]:
             top = _climbed(
-                [top], limits, tolerance, centred[part], values[part], kernel, shares[part]
+                [top], limits, tolerance, centred[part], values[part], kernel, errors.of(part)
             )
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
-    covariance[np.diag_indices_from(covariance)] += best[-1] * shares
+    errors.added(covariance, float(best[-1]))
     factor, _ = dpotrf(covariance, lower=1)
     alpha, _ = dpotrs(factor, values, lower=1)
     return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
@@ -125,12 +126,12 @@ def negative_likelihood(
     centred: Array,
     values: Array,
     kernel: Kernel = SQUARED_EXPONENTIAL,
-    shares: Array | float = 1.0,
+    errors: Errors | None = None,
 ) -> tuple[float, Array]:
     """Minus the log likelihood, and its gradient (d + 2,); infinite, and 0, where the covariance matrix cannot be factored.
 
-    `theta` (d + 2,): logarithms of signal variance, length scales and noise variance; `centred` (n, d): points; `values` and
-    `shares` (n,): as `maximise` takes them.
+    `theta` (d + 2,): logarithms of signal variance, length scales and noise variance; `centred` (n, d): points; `values` (n,)
+    and `errors`: as `maximise` takes them.
     """
     noise, count = np.exp(theta[-1]), len(values)
     level = theta[0] if kernel == SQUARED_EXPONENTIAL else 0.0
@@ -141,7 +142,8 @@ def negative_likelihood(
     exponents = left @ np.vstack(right)
     smooth, slopes = with_slopes(exponents, theta[0], kernel)
     covariance = smooth.copy()
-    covariance[np.diag_indices(count)] += noise * shares
+    errors = errors or Errors(np.ones(count))
+    errors.added(covariance, noise)
     # LAPACK and BLAS take the transpose without a copy, and touch its lower triangle only
     factor, failed = dpotrf(covariance.T, lower=1, overwrite_a=1, clean=0)
     if failed:
@@ -149,15 +151,22 @@ def negative_likelihood(
     alpha, _ = dpotrs(factor, values, lower=1)
     logarithm = np.log(np.diag(factor)).sum()
     inverse, _ = dpotri(factor, lower=1, overwrite_c=1)
-    noisy = noise * float((shares * (alpha**2 - np.diag(inverse))).sum())
+    noisy = noise * float((errors.own * (alpha**2 - np.diag(inverse))).sum())
+    known = 0.0 if errors.common is None else _weighed(errors.common, alpha, inverse)
     weights = dsyr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)  # K^-1 - alpha alpha'
     weights *= slopes.T
     table = np.column_stack([scaled, ones])
     products = dsymm(-1.0, weights, table, lower=1)
     rows = products[:, -1]
     lengths = rows @ scaled**2 - np.einsum("ij,ij->j", scaled, products[:, :-1])
-    # the sum of (alpha alpha' - K^-1) * S: all of K but its noise
-    signal = rows.sum() if kernel == SQUARED_EXPONENTIAL else values @ alpha - count - noisy
+    # the sum of (alpha alpha' - K^-1) * S: all of K but the errors
+    signal = rows.sum() if kernel == SQUARED_EXPONENTIAL else values @ alpha - count - noisy - known
     gradient = [0.5 * signal, *lengths, 0.5 * noisy]
     constant = 0.5 * count * np.log(2.0 * np.pi)
     return float(0.5 * values @ alpha + logarithm + constant), -np.array(gradient)
+
+
+def _weighed(matrix: Array, alpha: Array, inverse: Array) -> float:
+    """The sum of (alpha alpha' - K^-1) * a symmetric matrix, from the lower triangle of K^-1."""
+    below = 2.0 * np.tril(inverse).ravel() @ matrix.ravel() - np.diag(inverse) @ np.diag(matrix)
+    return float(alpha @ matrix @ alpha - below)
