@@ -60,8 +60,14 @@ def pin(name, journal, bearing, *, open_pins=()):
     return revolute(name, journal, bearing)
 
 
+def spring(name, first, second, stiffness, length, damping, **more):
+    ends = {"first": first, "second": second, "stiffness": stiffness, "length": length}
+    return load("spring", name, **ends, damping=damping, **more)
+
+
 def pins(open_pins, *rows):
-    return tuple(pin(*row, open_pins=open_pins) for row in rows)
+    """Pins by texts such as "o1 crank.a ground.o"."""
+    return tuple(pin(*row.split(), open_pins=open_pins) for row in rows)
 
 
 def slider_crank(*open_pins, drive=MOTOR, tilt=0.0, offset=0.0, friction=None, off=0.0, loads=()):
@@ -76,17 +82,20 @@ def slider_crank(*open_pins, drive=MOTOR, tilt=0.0, offset=0.0, friction=None, o
         bodies,
         (
             slide("guide", "slider.pin", "ground.line", tilt, friction),
-            *pins(
-                open_pins,
-                ("o14", "crank.a", "ground.o"),
-                ("o12", "crank.b", "rod.a"),
-                ("o23", "slider.pin", "rod.b"),
-            ),
+            *pins(open_pins, "o14 crank.a ground.o", "o12 crank.b rod.a", "o23 slider.pin rod.b"),
         ),
         (drive,),
         {"o": (0.0, 0.0), "line": shift},
         loads,
     )
+
+
+FOUR = (
+    "o1 crank.a ground.o",
+    "o2 crank.b coupler.a",
+    "o3 coupler.b rocker.b",
+    "o4 rocker.a ground.p",
+)
 
 
 def four_bar(*open_pins, drive=MOTOR, off=0.0, loads=()):
@@ -95,14 +104,8 @@ def four_bar(*open_pins, drive=MOTOR, off=0.0, loads=()):
         bar("coupler", 0.12, 0.3, 0.5, off=off, tip=(0.06, 0.05)),
         bar("rocker", 0.08, 0.25, 1.6, off=off),
     )
-    rows = (
-        ("o1", "crank.a", "ground.o"),
-        ("o2", "crank.b", "coupler.a"),
-        ("o3", "coupler.b", "rocker.b"),
-        ("o4", "rocker.a", "ground.p"),
-    )
     return Mechanism(
-        bodies, pins(open_pins, *rows), (drive,), {"o": (0.0, 0.0), "p": (0.13, 0.01)}, loads
+        bodies, pins(open_pins, *FOUR), (drive,), {"o": (0.0, 0.0), "p": (0.13, 0.01)}, loads
     )
 
 
@@ -138,7 +141,7 @@ def six_bar(*open_pins, friction=None):
     joints = (
         *base.joints,
         slide("bed", "ram.pin", "ground.bed", math.pi / 2, friction),
-        *pins(open_pins, ("o5", "rocker.b", "link.a"), ("o6", "ram.pin", "link.b")),
+        *pins(open_pins, "o5 rocker.b link.a", "o6 ram.pin link.b"),
     )
     loads = (load("force", "work", place="ram.pin", force=[0.0, -200.0]),)
     return Mechanism(bodies, joints, base.drives, {**base.ground, "bed": (0.13, 0.0)}, loads)
@@ -152,25 +155,10 @@ def quick_return(*open_pins, friction=None):
         bar("lever", 0.25, 0.6, 1.1, top=(0.25, 0.02)),
     )
     joints = (
-        *pins(
-            open_pins,
-            ("o1", "crank.a", "ground.o"),
-            ("o2", "crank.b", "block.pin"),
-            ("o3", "lever.a", "ground.p"),
-        ),
+        *pins(open_pins, "o1 crank.a ground.o", "o2 crank.b block.pin", "o3 lever.a ground.p"),
         slide("slot", "block.pin", "lever.a", 0.0, friction),
     )
-    loads = (
-        load(
-            "spring",
-            "return_spring",
-            first="lever.top",
-            second="ground.o",
-            stiffness=300.0,
-            length=0.1,
-            damping=2.0,
-        ),
-    )
+    loads = (spring("return_spring", "lever.top", "ground.o", 300.0, 0.1, 2.0),)
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.0, -0.1)}, loads)
 
 
@@ -198,12 +186,8 @@ def three_rrr(*open_pins):
         angle = 2.1 * k
         ground[f"g{k}"] = (radius * math.cos(angle), radius * math.sin(angle))
         bodies += [bar(f"arm{k}", 0.12, 0.2, angle + 2.2), bar(f"leg{k}", 0.14, 0.15, angle + 3.9)]
-        joints += pins(
-            open_pins,
-            (f"base{k}", f"arm{k}.a", f"ground.g{k}"),
-            (f"knee{k}", f"arm{k}.b", f"leg{k}.a"),
-            (f"tip{k}", f"leg{k}.b", f"platform.p{k}"),
-        )
+        knees = f"knee{k} arm{k}.b leg{k}.a", f"tip{k} leg{k}.b platform.p{k}"
+        joints += pins(open_pins, f"base{k} arm{k}.a ground.g{k}", *knees)
         drives.append(
             harmonic(f"servo{k}", f"arm{k}", 0.2, 2.0 * (1 + k % 2), angle + 2.2, 0.4 * k, k == 0)
         )
@@ -215,19 +199,9 @@ def pendulum_chain():
     bodies = tuple(
         bar(name, 0.1, 0.2, 0.3 * k, off=0.004) for k, name in enumerate(("crank", "two", "three"))
     )
-    joints = pins(
-        (), ("o1", "crank.a", "ground.o"), ("o2", "two.a", "crank.b"), ("o3", "three.a", "two.b")
-    )
+    joints = pins((), "o1 crank.a ground.o", "o2 two.a crank.b", "o3 three.a two.b")
     loads = (
-        load(
-            "spring",
-            "band",
-            first="three.b",
-            second="ground.q",
-            stiffness=50.0,
-            length=0.05,
-            damping=0.3,
-        ),
+        spring("band", "three.b", "ground.q", 50.0, 0.05, 0.3),
         load("torque", "brake", body="two", torque=-0.4),
     )
     return Mechanism(bodies, joints, (ENGINE,), {"o": (0.0, 0.0), "q": (0.2, 0.2)}, loads)
@@ -244,7 +218,7 @@ def two_stage(*open_pins):
     joints = (
         *base.joints,
         slide("feed", "tool.grip", "slider.top", 0.9),
-        *pins(open_pins, ("o5", "tool.grip", "strut.b"), ("o6", "strut.a", "ground.r")),
+        *pins(open_pins, "o5 tool.grip strut.b", "o6 strut.a ground.r"),
     )
     return Mechanism(bodies, joints, base.drives, {**base.ground, "r": (0.22, -0.05)}, base.loads)
 
@@ -257,12 +231,7 @@ def turning_slide(*open_pins, friction=None):
         bar("link", 0.09, 0.1, 2.5),
     )
     joints = (
-        *pins(
-            open_pins,
-            ("o1", "crank.a", "ground.o"),
-            ("o2", "block.pin", "link.b"),
-            ("o3", "link.a", "ground.p"),
-        ),
+        *pins(open_pins, "o1 crank.a ground.o", "o2 block.pin link.b", "o3 link.a ground.p"),
         slide("arm", "block.pin", "crank.c", 0.25, friction),
     )
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.06, 0.01)})
@@ -342,26 +311,8 @@ HELD = (
         angle=-0.2,
         damping=0.1,
     ),
-    load(
-        "spring",
-        "buffer",
-        first="coupler.tip",
-        second="ground.o",
-        stiffness=400.0,
-        length=0.09,
-        damping=3.0,
-        acts="pushing",
-    ),
-    load(
-        "spring",
-        "rope",
-        first="coupler.tip",
-        second="ground.p",
-        stiffness=250.0,
-        length=0.05,
-        damping=1.0,
-        acts="pulling",
-    ),
+    spring("buffer", "coupler.tip", "ground.o", 400.0, 0.09, 3.0, acts="pushing"),
+    spring("rope", "coupler.tip", "ground.p", 250.0, 0.05, 1.0, acts="pulling"),
 )
 MOVED = (
     load(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import overrides, run
-from linkages import bar, constant_speed, harmonic, pins, torque_drive
+from linkages import FOUR, bar, constant_speed, harmonic, pins, torque_drive
 from planar_scenes import planar_scene
 from test_linkage_scenes import ROCKER, rocker
 
@@ -28,10 +28,6 @@ JOBS = Path(__file__).parents[1] / "jobs" / "linkages"
 MOTOR = constant_speed("motor", "crank", 2 * math.pi)
 NOTHING = Points((), np.empty((1, 0)), ())
 LOCKED = "mechanism.bodies.coupler.length=0.088"
-FOUR = (
-    ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "coupler.a"),
-    ("o3", "coupler.b", "rocker.b"), ("o4", "rocker.a", "ground.p"),
-)  # fmt: skip
 
 
 def four_bar(a, b, c, g, start, elbow, open_pins=(), drive=MOTOR):
@@ -171,9 +167,7 @@ def test_dead_centres_of_six_bars_are_where_determinants_vanish():
             bar("crank", a, 0.2), coupler, bar("rocker", c, 0.2, angles[1]),
             bar("link", e, 0.2, angles[2]), bar("arm", f, 0.2, angles[3]),
         )  # fmt: skip
-        more = (
-            ("o5", "coupler.tip", "link.a"), ("o6", "link.b", "arm.b"), ("o7", "arm.a", "ground.q"),
-        )  # fmt: skip
+        more = "o5 coupler.tip link.a", "o6 link.b arm.b", "o7 arm.a ground.q"
         ground = {"o": (0.0, 0.0), "p": (g, 0.0), "q": (q.real, q.imag)}
         made = Mechanism(bodies, pins(("o2", "o6"), *FOUR, *more), (MOTOR,), ground)
         told = refused(passage(made, 0.0, 1))
@@ -278,7 +272,7 @@ def ideal(bodies, joints, drives, ground, **numerics):
 
 
 def parallelogram(start, speed, **more):
-    joints = [(one, two) for _, one, two in FOUR]
+    joints = [(one, two) for _, one, two in map(str.split, FOUR)]
     bodies = {"crank": (0.1, start), "coupler": (0.2, 0.0), "rocker": (0.1, start)}
     return ideal(bodies, joints, [("crank", speed)], {"o": [0.0, 0.0], "p": [0.2, 0.0]}, **more)
 
@@ -433,9 +427,7 @@ def test_clearance_decides_at_a_change_point_unless_ideal_joints_alone_depend():
     opened = replace(base, joints=pins(("o3",), *FOUR))
     assert refused(passage(opened, 0.0, 1)) is None
     bodies = (*base.bodies, bar("link", 0.3, 0.2, 0.1), bar("arm", 0.25, 0.2, 1.5))
-    more = (
-        ("o5", "rocker.b", "link.a"), ("o6", "link.b", "arm.b"), ("o7", "arm.a", "ground.q"),
-    )  # fmt: skip
+    more = "o5 rocker.b link.a", "o6 link.b arm.b", "o7 arm.a ground.q"
     ground = {"o": (0.0, 0.0), "p": (0.2, 0.0), "q": (0.5, -0.05)}
     carried = Mechanism(bodies, pins(("o5", "o6"), *FOUR, *more), (MOTOR,), ground)
     told = refused(passage(carried, 0.0, 1))
