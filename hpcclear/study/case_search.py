@@ -40,6 +40,9 @@ of that of the distance to it; rounds in a row that are not, after which the sea
 LEADERS, KNOWN = 3, 0.25
 """Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do."""
 
+ALIKE = 0.5
+"""Variance of the difference from the nearest design, over that from the best, below which one tells of the other."""
+
 AWAY, BOLD = 0.05, 2.0
 """How far `HEDGES` are off others, over the ranges; standard errors by which they may be better than is believed."""
 
@@ -130,7 +133,7 @@ class CaseSearch:
                 left.append((worth / (least or self._least), point))
         self._idle = self._idle + 1 if len(left) == count else 0
         if self._idle:
-            rows += self._beyond(beliefs, left)
+            rows = list(dict.fromkeys([*rows, *self._beyond(beliefs, left)]))
         self._again = {row for row in rows if self.designs.made[row].size}
         fresh = beliefs.pending
         if self._failures.goals and len(fresh):
@@ -140,23 +143,39 @@ class CaseSearch:
         return rows
 
     def _beyond(self, beliefs: Beliefs, left: Sequence[tuple[float, Array]]) -> list[int]:
-        """New designs where none is expected to win enough: those that may be the best, as long as the one that is taken for
-        it is expected to lose too much to them; then the best of those `left` and where nothing is known, since the models may
-        be wrong."""
+        """Designs where none is expected to win enough: those that may be the best, as long as the one that is taken for it is
+        expected to lose too much to them, or more simulations of known ones beside them; then the best of those `left` and
+        where nothing is known, since the models may be wrong."""
         main, rows = self._space.directions[0], list[int]()
         size = self._accuracy(beliefs, main)
         points, loss = improvement.drawn(beliefs, main, len(left))
         if loss > WORTH * size > 0.0:
             self._idle, self._hope = 0, loss / size
             for place in points:
-                beliefs.take(place)
-            return self.designs.add(points)
+                row = self._alike(beliefs, place, main)
+                if row is None:
+                    beliefs.take(place)
+                    rows += self.designs.add(place[None])
+                elif row not in rows:
+                    rows.append(row)
+            return rows
         point, apart = max(left, key=lambda one: one[0])[1], 1.0
         while apart > 0.0 and len(rows) < len(left):  # of a catalogue none may be left
             beliefs.take(point)
             rows += self.designs.add(point[None])
             point, apart = improvement.farthest(beliefs)
         return rows
+
+    def _alike(self, beliefs: Beliefs, place: Array, direction: Array) -> int | None:
+        """The known design beside a place whose own error hides how far both are from the best: more simulations of it tell
+        more than a new design, which would share that error."""
+        known = beliefs.known.designs
+        best = np.where(beliefs.allowed, beliefs.believed @ direction, np.inf).argmin()
+        row = int(self._space.apart(known, place).argmin())
+        off = [
+            beliefs.apart(place[None], one)[0] @ direction**2 for one in (known[row], known[best])
+        ]
+        return row if off[0] < ALIKE * off[1] and self._longer(row) else None
 
     def _leaders(self, beliefs: Beliefs) -> list[int]:
         """The design that is taken for the best, at first some, unless it has as many simulations as a design may have: what

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
@@ -151,7 +152,7 @@ class Beliefs:
 
     @property
     def noise(self) -> Array:
-        """Variance of what the error of one more design's objectives has for itself, (m,)."""
+        """Variance of the error of one more design's objectives that no neighbour shares, (m,)."""
         return np.array([0.0 if one is None else _noise(one.rest) for one in self.models])
 
     def shortfalls(self, points: Array, margins: Array | None = None) -> tuple[Array, Array]:
@@ -247,8 +248,17 @@ def _common(made: _Evaluated) -> Array | None:
 
 
 def _noise(model: Kriging) -> float:
-    share = float(np.median(model.errors.own)) if model.errors else 1.0
-    return float(model.scale**2 * model.noise_variance * share)
+    """Variance of the error that one more value has beyond what it shares with its neighbour, as a rule."""
+    if model.errors is None:
+        return float(model.scale**2 * model.noise_variance)
+    own, common = model.noise_variance * float(np.median(model.errors.own)), model.errors.common
+    if common is not None:
+        away = cdist(*[model.to_unit(model.inputs) / model.length_scales] * 2)
+        np.fill_diagonal(away, np.inf)
+        rows, near, sizes = np.arange(len(away)), away.argmin(axis=1), np.diag(common)
+        shared = common[rows, near] ** 2 / np.where(sizes[near] > 0.0, sizes[near], np.inf)
+        own += float(np.median(sizes - shared))
+    return float(model.scale**2 * own)
 
 
 def _extended(model: Trended, point: Array) -> Trended:
