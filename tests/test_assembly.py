@@ -159,10 +159,10 @@ def on_two_rails():
             bar("tail", 0.1, 0.1, -1.0),
         ),
         (
-            *pins((), ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "rod.a")),
+            *pins((), "o1 crank.a ground.o", "o2 crank.b rod.a"),
             slide("rail", "carriage.a", "ground.o"),
             slide("second", "carriage.b", "ground.high"),
-            *pins(("o3",), ("o3", "carriage.pin", "rod.b"), ("o4", "tail.a", "rod.b")),
+            *pins(("o3",), "o3 carriage.pin rod.b", "o4 tail.a rod.b"),
         ),
         (MOTOR,),
         {"o": (0.0, 0.0), "high": (0.0, 0.1)},

@@ -104,7 +104,7 @@ BROKEN = {
             bodies=(*BASE.bodies, bar("brace", 0.1, 0.1)),
             joints=(
                 *four_bar().joints,
-                *pins((), ("o5", "brace.a", "crank.b"), ("o6", "brace.b", "ground.p")),
+                *pins((), "o5 brace.a crank.b", "o6 brace.b ground.p"),
             ),
         ),
         "joints.o6",
