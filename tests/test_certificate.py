@@ -33,8 +33,8 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
-from hpcclear.scene.loading import parse
 from hpcclear.scene.switches import Off, switches
+from hpcclear.scene.syntax import parse
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
 from hpcclear.study.extent import certificate_extent

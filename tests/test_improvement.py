@@ -14,6 +14,7 @@ from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.beliefs import Beliefs, Known, Space
 from hpcclear.study import extent
+from hpcclear.study.case_search import CaseSearch
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.simulated import Simulated
 
@@ -191,6 +192,19 @@ def test_what_flatters_a_region_is_not_believed_of_it():
     for one, off in ((known, 0.3), (shared, 0.0)):
         steps = Beliefs(one, space, rng).believed - truth
         assert abs(steps[~left].mean() - steps[left].mean() - off) < 0.05
+
+
+def test_a_design_is_simulated_again_where_a_new_one_would_share_its_error():
+    """Of two groups far apart one has an error in common: a new design within it would say no more, one between them would."""
+    rng, none = np.random.default_rng(11), np.empty((16, 0))
+    designs = np.vstack([rng.random((8, 2)) * 0.1, 0.9 + rng.random((8, 2)) * 0.1])
+    left = np.arange(16)[:, None] < 8
+    errors, shift = np.where(left, 0.3, 1e-6), rng.standard_normal(12)
+    known = Known(designs, 1.0 * left, errors, none, none, (errors * shift)[None])
+    beliefs = Beliefs(known, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
+    case = SimpleNamespace(_space=beliefs.space, _longer=lambda row: True)
+    assert CaseSearch._alike(case, beliefs, designs[0] + 0.02, np.ones(1)) in range(8)
+    assert CaseSearch._alike(case, beliefs, np.array([0.5, -1.5]), np.ones(1)) is None
 
 
 def test_constraints_are_kept():

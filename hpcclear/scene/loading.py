@@ -4,7 +4,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.paths import files_named
 from hpcclear.scene.plugged import check_trust
 from hpcclear.scene.scene import Scene, load_scene
-from hpcclear.scene.syntax import parse as parse
+from hpcclear.scene.syntax import parse
 
 
 def scene_of_text(text: str, name: str) -> Scene:

@@ -41,7 +41,8 @@ LEADERS, KNOWN = 3, 0.25
 """Designs that get more simulations first, and standard error, over the accuracy requested, beyond which they do."""
 
 ALIKE = 0.5
-"""Variance of the difference from the nearest design, over that from the best, below which one tells of the other."""
+"""What is not known of the difference from the nearest simulated design, over what is not known of the difference from the best
+(variances): below this share the nearest design is simulated again in place of the new one."""
 
 AWAY, BOLD = 0.05, 2.0
 """How far `HEDGES` are off others, over the ranges; standard errors by which they may be better than is believed."""
@@ -167,8 +168,8 @@ class CaseSearch:
         return rows
 
     def _alike(self, beliefs: Beliefs, place: Array, direction: Array) -> int | None:
-        """The known design beside a place whose own error hides how far both are from the best: more simulations of it tell
-        more than a new design, which would share that error."""
+        """The simulated design nearest to a place, if a new design there would have nearly the same error: then further
+        simulations of the nearest one say more about both. None if it would not, or if the nearest one may have no more."""
         known = beliefs.known.designs
         best = np.where(beliefs.allowed, beliefs.believed @ direction, np.inf).argmin()
         row = int(self._space.apart(known, place).argmin())

@@ -13,7 +13,7 @@ from hpcclear.report.html.content import Content, scene_of
 from hpcclear.report.html.markup import Number, PageTable, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results, texts_in
-from hpcclear.scene.loading import parse
+from hpcclear.scene.syntax import parse
 
 LISTED = 40  # samples listed by number before the rest is only counted
 

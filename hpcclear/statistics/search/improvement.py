@@ -153,14 +153,14 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
         return nearer
     weights = beliefs.rng.dirichlet(np.ones(front.shape[1]))
     noise = beliefs.rng.standard_normal((DRAWS, 1, front.shape[1]))
-
     best = None if direction is None else designs[(front @ direction).argmin()]
+    errors = beliefs.noise
 
     def function(points: Array) -> Array:
         mean, deviation = beliefs.means(points), np.sqrt(beliefs.apart(points, best))
         if direction is not None:
             own, spread = mean @ direction, np.sqrt(deviation**2 @ direction**2)
-            error = np.sqrt(beliefs.noise @ direction**2)
+            error = np.sqrt(errors @ direction**2)
             told = 1.0 - error / np.sqrt(spread**2 + error**2 + 1e-300)
             won = gain((front @ direction).min(), own, spread) * told
         elif front.shape[1] == 2:

@@ -172,9 +172,8 @@ class Kriging:
     @property
     def error_variances(self) -> Array:
         """Variances of the errors of the training values, (n,), in squared units of these."""
-        matrix = np.zeros((len(self.values), len(self.values)))
-        (self.errors or Errors(np.ones(len(matrix)))).added(matrix, self.noise_variance)
-        return self.scale**2 * np.diag(matrix)
+        errors = self.errors or Errors(np.ones(len(self.values)))
+        return self.scale**2 * errors.variances(self.noise_variance)
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).
@@ -187,9 +186,8 @@ class Kriging:
 
     def _noisy_covariance(self) -> Array:
         """Covariance of the training values, in units of ``scale**2``."""
-        unit = self.to_unit(self.inputs)
-        matrix = self._covariance(unit, unit)
-        (self.errors or Errors(np.ones(len(unit)))).added(matrix, self.noise_variance)
+        matrix = self._covariance(self._unit, self._unit)
+        (self.errors or Errors(np.ones(len(matrix)))).added(matrix, self.noise_variance)
         return matrix
 
     def _covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
