@@ -16,12 +16,13 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session, command_line
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Session, command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
+from hpcclear.results.places import Place
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points

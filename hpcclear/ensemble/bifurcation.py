@@ -12,12 +12,13 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ensemble.single import SHORTEST, TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
+from hpcclear.results.places import Place
 from hpcclear.results.signals import Signal, is_counted, signal
 from hpcclear.scene import Scene
 

@@ -16,7 +16,7 @@ from hpcclear.dynamics.setup.problem import coordinate_count
 from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult, judged
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import sample_points, saving
-from hpcclear.ensemble.session import Finished, Options, Place, Session
+from hpcclear.ensemble.session import Finished, Options, Session
 from hpcclear.ensemble.simulate import Payload
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
@@ -24,6 +24,7 @@ from hpcclear.ranks.terminal import announce
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

@@ -10,12 +10,13 @@ from hpcclear.base.units import UnitError, note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.samples import sample_points, samples_of, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
 

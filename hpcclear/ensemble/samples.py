@@ -15,7 +15,7 @@ from hpcclear.base.outcome import JOINTS, recast
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble import simulate
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ensemble.split import Part, whole
 from hpcclear.ranks import leading
 from hpcclear.ranks.progress import Progress
@@ -26,6 +26,7 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, expanded, latin_hypercube, read_points
 from hpcclear.scene.sampling import monte_carlo

@@ -15,7 +15,7 @@ from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import samples_of, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
 from hpcclear.ranks.progress import LongProgress
@@ -23,6 +23,7 @@ from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams import BINS, BLOCK, QUANTITIES, Accumulator, Summary, rows_of

@@ -20,13 +20,14 @@ from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
 from hpcclear.ensemble.samples import sample_points, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ranks.progress import LivesProgress
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers, Points
 from hpcclear.scene.sampling import monte_carlo

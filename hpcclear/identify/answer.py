@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
 from hpcclear.ensemble.single import SHORTEST
 from hpcclear.identify import advice as advising
 from hpcclear.identify.features import Layout
@@ -25,6 +25,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.kinds.identify import with_units
+from hpcclear.results.places import Place
 from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of

@@ -28,11 +28,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import saving
-from hpcclear.ensemble.session import Options, Place, Session
+from hpcclear.ensemble.session import Options, Session
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style
 from hpcclear.results.checkpoint import unfinished
+from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points, expanded

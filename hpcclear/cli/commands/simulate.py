@@ -32,9 +32,10 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     from hpcclear.dynamics import sizing
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulated
-    from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
+    from hpcclear.ensemble.session import DEFAULT_OPTIONS, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
+    from hpcclear.results.places import Place
 
     if sizing.stored_bytes(scene) > sizing.LARGE:
         cli.say(f"Time series: {sizing.words(scene)}. Shorter with --keep N")
