@@ -18,7 +18,7 @@ import numpy as np
 from closed_forms import DESIGN, PATHS, Form, Judge, dynamics, form_of, random_inputs, scene_of
 from regret import carried_out
 
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import Scene
 from hpcclear.study import forecast

@@ -28,7 +28,7 @@ from scipy.optimize import differential_evolution
 
 from hpcclear.base.student import student
 from hpcclear.base.verdict import Verdict
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.merit import SPAN, recommended
 from hpcclear.results import dataset

@@ -22,7 +22,7 @@ from closed_forms import DESIGN, PATHS, Form, Judge, dynamics, form_of, random_i
 from regret import carried_out
 
 from hpcclear.base.verdict import Verdict
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from hpcclear.base import width
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.provenance import program
 from hpcclear.scene import load_scene

@@ -7,7 +7,7 @@ import pytest
 from formula_study import formula, scene_of
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.study import extent, forecast, simulations
 

@@ -242,7 +242,7 @@ def test_lanes_that_differ_from_rank_to_rank_are_refused(tmp_path):
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.mpi)])
 def test_a_time_limit_is_told_even_when_root_hears_nothing(tmp_path, ranks):
     words = [*sample(tmp_path / "x.nc", 40), "--time-limit", "0.5"]
-    deaf = {"TEST_FAIL": "sleep hpcclear.ensemble.samples:design"}
+    deaf = {"TEST_FAIL": "sleep hpcclear.ensemble.session:design"}
     code, output = finish(start(words, ranks, **deaf), 60)
     assert code == 3, output
     assert output.count("Stopped early: the time limit was reached") == 1, output

@@ -23,8 +23,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.ensemble.effects import run_effects
 from hpcclear.ensemble.maps import run_map
-from hpcclear.ensemble.samples import run_sample
-from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ensemble.trial import Wanted
 from hpcclear.ensemble.wear import run_wear

@@ -13,8 +13,7 @@ from own_engine import engine
 import hpcclear
 from hpcclear.base.objectives import OURS
 from hpcclear.cli.printing import describe_response
-from hpcclear.ensemble.samples import run_sample
-from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import labels
 from hpcclear.scene import load_scene

@@ -7,7 +7,7 @@ import pytest
 
 from hpcclear.accuracy.plan import Plan, Row, measure
 from hpcclear.cli.plan import RESERVE, slurm
-from hpcclear.ensemble.samples import design, sample_points
+from hpcclear.ensemble.session import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.special import gamma
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.samples import design
+from hpcclear.ensemble.session import design
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.sampling import monte_carlo

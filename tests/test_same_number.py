@@ -17,8 +17,7 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
-from hpcclear.ensemble.samples import run_sample
-from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures.labels import with_half_width
 from hpcclear.scene import Scene, load_scene

@@ -10,8 +10,7 @@ from commands import CHEAP, SCENE, kill, overrides, run, sample, start
 from patience import crowded
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.samples import design, run_merge, run_sample
-from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.session import Options, design, run_merge, run_sample
 from hpcclear.ensemble.split import Part
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene

@@ -103,10 +103,10 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
 
 BEFORE = [
     "call hpcclear.scene:load_scene",
-    "call hpcclear.ensemble.samples:design",
+    "call hpcclear.ensemble.session:design",
     "call hpcclear.base.lock:Lock.acquire",
     "call hpcclear.results.checkpoint:Checkpoint._open",
-    "import hpcclear.ensemble.samples",
+    "import hpcclear.ensemble.session",
     "import hpcclear.scene",
 ]
 DURING = ["import hpcclear.dynamics.evaluation.evaluator", "maker", "simulation"]

@@ -11,7 +11,7 @@ import pytest
 from formula_study import contents, formula, on_ranks
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.pooled import together

@@ -13,7 +13,7 @@ from scipy import stats
 import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Empirical
-from hpcclear.ensemble.samples import design
+from hpcclear.ensemble.session import design
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.random import rules

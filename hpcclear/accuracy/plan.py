@@ -22,7 +22,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.steady import wording
-from hpcclear.ensemble.samples import design, sample_points
+from hpcclear.ensemble.session import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import Progress, duration
 from hpcclear.ranks.schedule import COLUMNS

@@ -16,7 +16,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Session, command_line
+from hpcclear.ensemble.session import Options, Session, command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -202,7 +202,7 @@ def run_accuracy(
     ranks: Ranks,
     profile: Profile,
     notify: Notify,
-    options: Options = DEFAULT_OPTIONS,
+    options: Options = Options(),
 ) -> tuple[Results, dict[str, Path]]:
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 

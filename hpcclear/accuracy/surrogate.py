@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box

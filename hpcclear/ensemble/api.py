@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.ensemble.samples import samples_of
+from hpcclear.ensemble.session import samples_of
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES

@@ -12,7 +12,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session
 from hpcclear.ensemble.single import SHORTEST, TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
@@ -86,7 +86,7 @@ def run_bifurcation(
     output: Path,
     ranks: Ranks,
     observation: Observation = Observation(),
-    options: Options = DEFAULT_OPTIONS,
+    options: Options = Options(),
 ) -> Finished:
     """Simulate a scene at each value of an entry (``PATH=LO:HI:N``) on all ranks, and write what is observed of each
     revolution; on root. Raises InputError, StorageError, Stopped, RankFailed.

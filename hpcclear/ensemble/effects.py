@@ -15,8 +15,7 @@ from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.setup.problem import coordinate_count
 from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult, judged
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.samples import sample_points, saving
-from hpcclear.ensemble.session import Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session, sample_points, saving
 from hpcclear.ensemble.simulate import Payload
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks

@@ -9,8 +9,7 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.units import UnitError, note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.samples import sample_points, samples_of, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session, sample_points, samples_of, saving
 from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
@@ -100,7 +99,7 @@ def make_mapper(payload: Payload, ranks: Ranks) -> "SteadyEvaluator":
 
 
 def run_map(
-    scene: Scene, axes: tuple[str, ...], output: Path, ranks: Ranks, options: Options = DEFAULT_OPTIONS
+    scene: Scene, axes: tuple[str, ...], output: Path, ranks: Ranks, options: Options = Options()
 ) -> Finished:  # fmt: skip
     """Judge every cell of a grid of one or two axes (``PATH=LO:HI:N``) on all ranks and write it, a sample a cell; on root.
 

@@ -10,7 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
-from hpcclear.ensemble.samples import samples_of
+from hpcclear.ensemble.session import samples_of
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.results.content import Results

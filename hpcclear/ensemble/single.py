@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.response import simulate_together
-from hpcclear.ensemble.samples import saving
+from hpcclear.ensemble.session import saving
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import Task

@@ -14,8 +14,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.samples import samples_of, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session, samples_of, saving
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
 from hpcclear.ranks.progress import LongProgress
@@ -57,7 +56,7 @@ def run_statistics(
     *,
     samples: int | None = None,
     raw: Path | None = None,
-    options: Options = DEFAULT_OPTIONS,
+    options: Options = Options(),
 ) -> Finished:
     """Simulate Monte Carlo samples of a study on all ranks and write their statistics; on root.
 

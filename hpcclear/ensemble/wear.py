@@ -19,8 +19,7 @@ from hpcclear.dynamics.wear.life import Asked, Asking, LifePlan, WearOutcome, li
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
-from hpcclear.ensemble.samples import sample_points, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session, sample_points, saving
 from hpcclear.ranks.progress import LivesProgress
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style
@@ -220,7 +219,7 @@ def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> Wea
 
 
 def run_wear(
-    scene: Scene, output: Path, ranks: Ranks, options: Options = DEFAULT_OPTIONS, timing: Path | None = None
+    scene: Scene, output: Path, ranks: Ranks, options: Options = Options(), timing: Path | None = None
 ) -> Finished:  # fmt: skip
     """Simulate the service lives of a scene with a worn joint on all ranks and write them; on root.
 

@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Session
+from hpcclear.ensemble.session import Finished, Options, Session
 from hpcclear.ensemble.single import SHORTEST
 from hpcclear.identify import advice as advising
 from hpcclear.identify.features import Layout
@@ -32,7 +32,7 @@ from hpcclear.scene.planar import turns_of
 
 
 def run_identify(
-    scene: Scene, output: Path, ranks: Ranks, settings: Settings, options: Options = DEFAULT_OPTIONS
+    scene: Scene, output: Path, ranks: Ranks, settings: Settings, options: Options = Options()
 ) -> Finished:
     """Identify unknowns on all ranks and write what was found; on root. Random inputs of the scene's study are nuisance inputs.
 

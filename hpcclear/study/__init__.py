@@ -27,8 +27,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.samples import saving
-from hpcclear.ensemble.session import Options, Session
+from hpcclear.ensemble.session import Options, Session, saving
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Records
 from hpcclear.ensemble.effects import effects_dataset, times_of
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.report.figures.effects import statements
 from hpcclear.scene import Scene

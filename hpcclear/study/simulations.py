@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style

@@ -27,7 +27,7 @@ from numba.core.registry import cpu_target
 
 import hpcclear
 from hpcclear import cli, scene
-from hpcclear.ensemble import identity, samples
+from hpcclear.ensemble import identity, session
 from hpcclear.laws import checks
 from hpcclear.ranks import boundary
 
@@ -135,7 +135,7 @@ def load() -> None:
     last_bits.disturb()
     boundary.describe_mpi()  # loads the library once for all; the rest is what another user may not read
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
-    identity.sample_key(shipped, samples.design(shipped, None))
+    identity.sample_key(shipped, session.design(shipped, None))
     checks.registry()
     # which of them keeps Numba to one thread is found later
     for layer in ("tbbpool", "omppool", "workqueue"):

@@ -55,7 +55,7 @@ def run(
 
         scene = cli.noted(load_scene(*written))
         from hpcclear.cli.printing import describe_run
-        from hpcclear.ensemble.samples import run_sample
+        from hpcclear.ensemble.session import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
         from hpcclear.report.spread import beyond, shares, units_of
@@ -79,7 +79,7 @@ def _merge(written: cli.Written, output: Path, points: Path | None) -> None:
 
     scene = cli.noted(load_scene(*written))
     from hpcclear.cli.printing import describe_run
-    from hpcclear.ensemble.samples import design, run_merge
+    from hpcclear.ensemble.session import design, run_merge
     from hpcclear.ranks.boundary import alone
 
     describe_run(run_merge(scene, design(scene, points), output, alone()), "samples")

@@ -32,7 +32,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     from hpcclear.dynamics import sizing
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulated
-    from hpcclear.ensemble.session import DEFAULT_OPTIONS, Session
+    from hpcclear.ensemble.session import Options, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
     from hpcclear.results.places import Place
@@ -40,7 +40,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     if sizing.stored_bytes(scene) > sizing.LARGE:
         cli.say(f"Time series: {sizing.words(scene)}. Shorter with --keep N")
     place = Place.of_response(cli.place_of(output))
-    with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
+    with Session(place, {"command": "simulate"}, alone(), Options()):
         if output.exists():
             dataset.read(output, "response")  # an earlier response is replaced, and nothing else
         response = simulated(scene)

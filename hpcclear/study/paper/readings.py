@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
-from hpcclear.ensemble.samples import sample_points
+from hpcclear.ensemble.session import sample_points
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.report.figures.motion import eccentricity
