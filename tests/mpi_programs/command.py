@@ -176,6 +176,7 @@ def sabotage() -> None:
     if not HERE:
         return
     if FAIL.startswith("import "):
+        sys.modules.pop(FAIL.removeprefix("import "), None)  # loaded above, for what is noted
         sys.meta_path.insert(0, NoImport())
     if FAIL.startswith(("call ", "once ", "sleep ")):
         what, place, *count = FAIL.split()
