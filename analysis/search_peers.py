@@ -222,7 +222,7 @@ def compared(seed: int, out: Path, names: list[str]) -> list[dict[str, Any]]:
     scene, form, kind, scanning, fine = study(seed)
     case, kept = scene.required_study.cases[0], out / f"{seed}.json"
     rows: list[dict[str, Any]] = json.loads(kept.read_text()) if kept.exists() else []
-    ideal = fine.of(least(seed, scanning))[0]
+    ideal = fine.of(least(seed, scanning, fine))[0]
 
     def regret(design: Any) -> tuple[float, float]:
         merit, broken, _ = fine.of(design)
