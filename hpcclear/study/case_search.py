@@ -9,7 +9,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.report.merit import SPAN
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
@@ -67,9 +66,7 @@ class CaseSearch:
         self._names = run.study.design_variables(case.name)
         self._region, self._rng = box(run.scene, self._names), run.rng("search", case.name)
         guesses = Guesses(run, case, models, self._size)
-        directions = np.eye(len(case.goals))
-        if case.plain:  # mean + 2 standard deviations are what a design is recommended by
-            directions = np.vstack([[1.0, SPAN], directions])
+        directions = contest.directions(case)
         self._space = Space(
             self._region.bounds,
             directions,

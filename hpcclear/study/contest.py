@@ -56,9 +56,8 @@ def worth_more(
         length = np.array([made[k][0].size for k in rows]) / settings.most_samples
         known = np.isfinite(values).all(axis=1) & (chances > 0.0)
         holds, open_ = known & (chances == 1.0), known & (chances < 1.0) & (length <= 0.5)
-        directions = np.eye(count) if not case.plain else np.vstack([[1.0, SPAN], np.eye(count)])
         leaders = set[int]()
-        for number, direction in enumerate(directions):
+        for number, direction in enumerate(directions(case)):
             own, moved = values @ direction, np.einsum("nkr,k->nr", shifts, direction)
             if holds.any():
                 least = int(np.where(holds, own, np.inf).argmin())
@@ -93,6 +92,13 @@ def worth_more(
             and not _accurate(run, one, made[k], wanted[k], many[k])
         }
     return sorted(k for k in found if 2 * made[k][0].size <= settings.most_samples)
+
+
+def directions(case: Case) -> Array:
+    """Weights of the objectives (m,) in each sum whose least value counts, (k, m): first of that by which a design is
+    recommended, mean + 2 standard deviations where both are minimised."""
+    each = np.eye(len(case.goals))
+    return np.vstack([[1.0, SPAN], each]) if case.plain else each
 
 
 def size_of(run: StudyRun, case: Case, direction: Array, values: Array) -> float:

@@ -4,7 +4,8 @@ A design is verified by more and more simulations, and is looked at after each d
 constraint is recommended. Both favour luck: of many designs near a threshold some look better than they are. So each verdict
 takes a share of the error that is allowed: designs share it evenly (Bonferroni), looks by halves, most of it for the last
 (spending of error; K. K. G. Lan and D. L. DeMets, "Discrete sequential boundaries for clinical trials", Biometrika 70 (1983),
-doi:10.1093/biomet/70.3.659). What is printed beside it is the usual interval of each design by itself.
+doi:10.1093/biomet/70.3.659). A design keeps its constraint or breaks it, so that one end of the interval alone can err, and has
+all of that share. What is printed beside it is the usual interval of each design by itself.
 """
 
 import math
@@ -41,13 +42,14 @@ def rivals(choices: Sequence[Choice]) -> list[int]:
 
 
 def level(settings: Verification, many: int, simulations: int) -> float:
-    """Two-sided confidence of one verdict of `many`, after so many simulations of a design.
+    """Two-sided confidence of the interval of one verdict of `many`, after so many simulations of a design.
 
-    The last look that a design may get has half of its error, the one before a quarter, and so on.
+    The last look that a design may get has half of its error, the one before a quarter, and so on; all of it for either end,
+    since one of them alone can err.
     """
     longer = 1.0 if settings.draws is not None else settings.most_samples / simulations
     left = int(math.log2(max(longer, 1.0)))
-    return 1.0 - (1.0 - settings.confidence) / many * 0.5 ** (1 + left)
+    return 1.0 - 2.0 * (1.0 - settings.confidence) / many * 0.5 ** (1 + left)
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
