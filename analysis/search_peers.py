@@ -3,10 +3,10 @@
     python analysis/search_peers.py OUT            # ten studies, one after the other; writes results/search_peers.csv
     python analysis/search_peers.py OUT --workers 2
 
-The studies are those of `analysis/fresh_studies.py` from seed 1800 on; bounded probabilities below `RAREST` are left out, since
+The studies are those of `analysis/fresh_studies.py` from seed 2060 on; bounded probabilities below `RAREST` are left out, since
 `DRAWS` plain draws a design do not see such failures. Each study is carried out once. Each peer runs with several seeds until
 the median of their regrets is at most the study's plus `EQUAL`, the resolution of the judge; the least of `BUDGETS` at which
-that is so counts. Of the package `reached` is the same: what its search takes with the least of `ROUNDS` by which its regret is
+that is so counts. Of the package `reached` is the same: what its search takes with the least of `LIMITS` by which its regret is
 within `EQUAL` of that by default; `search` is what it takes until it ends by itself, which peers do not. Peers evaluate the
 same formula for `DRAWS` random draws of the inputs a design:
 
@@ -52,8 +52,9 @@ from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 
 RESULTS = Path(__file__).parent / "results" / "search_peers.csv"
-FIRST, STUDIES, RAREST, ROUNDS = 1800, 10, 1e-2, (1, 2)
-DRAWS, BUDGETS, SEEDS, SLOW = 64, (800, 1600, 3200, 6400, 12800, 25600, 51200), (1, 2, 3), 3200
+FIRST, STUDIES, RAREST, LIMITS = 2060, 10, 1e-2, ((1, 1), (1, 3), (1, 6), (1, 12), (2, 12))
+DRAWS, SEEDS, SLOW = 64, (1, 2, 3), 3200
+BUDGETS = (565, 800, 1130, 1600, 2260, 3200, 4530, 6400, 9050, 12800, 25600, 51200)
 EQUAL, SURE, ABOVE = 5e-4, 0.9, 1e-3
 SEARCH = "kriging", "kriging check", "search"
 LOW, HIGH = np.array([PATHS[name][1:] for name in DESIGN]).T
@@ -73,7 +74,7 @@ class Draws:
 
     def _judge(self) -> Truth:
         judge = Judge(self._scene, self._form, DRAWS, 100_000 * self._seed + self._count, 1.0)
-        return Truth(self._scene, judge, judge)
+        return Truth(self._scene, judge, lambda: judge)
 
     def __call__(self, unit: np.ndarray) -> np.ndarray:
         """Merit, and each constraint less its threshold: relative, or probits of a share of the draws."""
@@ -238,11 +239,13 @@ def compared(seed: int, out: Path, names: list[str]) -> list[dict[str, Any]]:
         kept.write_text(json.dumps(rows))
         print(*rows[-1].values(), flush=True)
 
-    def carried(rounds: int | None) -> tuple[int, int, float, float]:
-        """Simulations of the search and of the whole study, and regret and excess of the design recommended."""
-        place = out / str(seed) / f"study_{rounds}"
+    def carried(rounds: int = 0, designs: int = 0) -> tuple[int, int, float, float]:
+        """Simulations of the search and of the whole study, and regret and excess of the design recommended; by default, or
+        with so many new designs."""
+        place = out / str(seed) / f"study_{rounds}_{designs}"
         place.parent.mkdir(exist_ok=True)
-        limited = {"study.verification.infill_rounds": rounds} if rounds else {}
+        keys = ("study.verification.infill_rounds", "study.verification.infill_designs")
+        limited = dict(zip(keys, (rounds, designs), strict=True)) if rounds else {}
         with dynamics(form):
             directory, count = carried_out(scene.with_(limited), place)
         table = dataset.read(directory / "verification.nc", "verification").to_xarray()
@@ -252,8 +255,8 @@ def compared(seed: int, out: Path, names: list[str]) -> list[dict[str, Any]]:
         return sum(stages.get(one, 0) for one in SEARCH), count, own, broken
 
     if not rows:
-        search, count, own, broken = carried(None)
-        shorter = (carried(rounds) for rounds in ROUNDS)
+        search, count, own, broken = carried()
+        shorter = (carried(*limit) for limit in LIMITS)
         reached_by = next((spent for spent, _, its, _ in shorter if its <= own + EQUAL), search)
         add(
             "hpcclear", reached=min(reached_by, search), search=search, simulations=count, regret=round(own, 5),

@@ -164,20 +164,24 @@ def test_a_trend_that_is_flat_but_for_round_off_is_none(level):
 
 
 def test_more_simulations_are_worth_most_where_they_may_change_the_choice():
-    """Of three designs with large errors two compete; what is known exactly, or is out of question, is worth nothing."""
-    rng = np.random.default_rng(4)
+    """Of three designs with large errors two compete; what is known exactly, or is out of question, is worth nothing; nor is
+    what all designs have in common, of which a further one tells no more."""
+    rng, space = np.random.default_rng(4), Space(BOUNDS, np.eye(1), (None,), np.empty(0))
     designs = np.vstack([np.linspace(0.0, 1.0, 8), np.linspace(-2.0, 2.0, 8)]).T
     values = np.array([1.0, 1.02, 3.0, 3.1, 3.2, 3.1, 3.0, 2.9])[:, None]
-    beliefs = Beliefs(
-        known_of(designs, values, 0.3), Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng
-    )
-    worth = improvement.replications(beliefs, np.ones(1))
+    known = known_of(designs, values, 0.3)
+    shared = replace(known, shifts=np.tile([1.0, -1.0, 1.0, -1.0], (1, 8, 1)))
+    each = [Beliefs(one, space, rng) for one in (known, known_of(designs, values, 1e-9), shared)]
+    worth, exact, common = (improvement.replications(one, np.ones(1)) for one in each)
     assert (worth >= 0.0).all()
     assert set(np.argsort(worth)[-2:].tolist()) == {0, 1}
-    sure = Beliefs(
-        known_of(designs, values, 1e-9), Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng
+    assert exact.max() < 0.01 * worth.max()
+    assert common.max() < 0.5 * worth.max()
+    straight, own = replace(shared, values=designs[:, :1]), rng.standard_normal((1, 8, 4))
+    same, apart = (
+        Beliefs(replace(straight, shifts=one), space, rng) for one in (shared.shifts, own)
     )
-    assert improvement.replications(sure, np.ones(1)).max() < 0.01 * worth.max()
+    assert same.noise < 0.5 * apart.noise
 
 
 def test_what_flatters_a_region_is_not_believed_of_it():
@@ -229,10 +233,8 @@ def test_where_nothing_keeps_the_constraints_designs_go_towards_them():
 
 
 def test_only_designs_of_a_catalogue_are_asked_for():
-    def snap(x):
-        return np.column_stack([np.round(x[:, 0] * 10.0) / 10.0, x[:, 1]])
-
-    designs = searched(space_of(snap), 4, np.random.default_rng(6)).known.designs
+    space = space_of(lambda x: np.column_stack([np.round(10.0 * x[:, 0]) / 10.0, x[:, 1]]))
+    designs = searched(space, 4, np.random.default_rng(6)).known.designs
     np.testing.assert_allclose(designs[:, 0] * 10.0, np.round(designs[:, 0] * 10.0))
 
 
@@ -283,14 +285,12 @@ def simulated(f, length, guesses=()):
 
 
 def test_scatter_that_the_surrogate_explains_needs_no_simulations():
-    """f is the surrogate's and a constant: few points tell what all would."""
+    """f is the surrogate's and a constant: few points tell what all would, with the errors of the surrogate's own points."""
     f = np.random.default_rng(8).normal(1.0, 0.1, (16, 256))
     guesses = SimpleNamespace(of=lambda choice, length: np.stack([f, 0.0 * f]), length=256)
     (few, errors), (all_, _) = simulated(f, 2, guesses).of(1, 2)[0], simulated(f, 256).of(1, 256)[0]
     np.testing.assert_allclose(few, all_, rtol=1e-9)
-    assert (
-        errors[0] < 0.2 * simulated(f, 2).of(1, 2)[0][1, 0]
-    )  # those of the surrogate's own points
+    assert errors[0] < 0.2 * simulated(f, 2).of(1, 2)[0][1, 0]
 
 
 @pytest.mark.nightly
