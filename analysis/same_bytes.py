@@ -27,7 +27,7 @@ import xarray as xr
 ROOT = Path(__file__).resolve().parent.parent
 RESPONSES = ("slider_crank", "hunt_crossley")
 
-TOLERANCE = 1e-5
+TOLERANCE = 1e-9
 """Largest difference of two values of a regular motion at rtol 1e-9, relative to the largest value of the variable. Series are
 interpolated between the ends of steps."""
 
