@@ -2,7 +2,7 @@
 
     python analysis/fresh_studies.py 1000                     # 40 studies from seed 1000 on; writes results/fresh_studies.csv
     python analysis/fresh_studies.py 3 --studies 10 --csv x.csv
-    python analysis/fresh_studies.py 1160 --studies 20 --kinds wild --csv analysis/results/wild_studies.csv
+    python analysis/fresh_studies.py 2100 --studies 17 --kinds wild --csv analysis/results/wild_studies.csv
 
 f of each study is a random formula in masses, a mass centre and two clearances (`closed_forms`): smooth, rough, with two modes
 or chaotic, or as wild as peak forces. What is made small is the mean and the standard deviation, a percentile, or the negative
