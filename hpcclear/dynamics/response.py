@@ -73,9 +73,14 @@ def simulate(
 
 
 def simulated(
-    scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
+    scene: Scene,
+    objective: Objective | None = None,
+    copy: int = 0,
+    *,
+    checked: bool = True,
+    spectra: bool = True,
 ) -> Results:
-    """Simulate a scene as `simulate` does; the content of its file."""
+    """Simulate a scene as `simulate` does; the content of its file, with order spectra of forces or without."""
     averaged = scene.numerics.target_error is not None and scene.clearance_joints()
     steady = evaluate_records(scene, steps.ITSELF) if averaged else None
     named, scene = scene, scene if steady is None else _shown(scene, steady)
@@ -86,7 +91,7 @@ def simulated(
         replicated = checked and not copy and steady is None
         perturbations = evaluator.alone(scene.numerics.rtol) if replicated else ()
         recording = steps.Recording(scene, (copy,), perturbations, objective)
-        collected = Collected(scene, recording.samples[0])
+        collected = Collected(scene, recording.samples[0], spectra)
         for rows in recording.chunks():
             collected.take(rows)
         found = collected.finish(recording.record())
@@ -98,8 +103,8 @@ def simulate_together(
 ) -> Iterator[tuple[int, Results]]:
     """Simulate scenes that differ in numbers only in one batch; yield their places in the sequence and responses, in any order.
 
-    Every response has the bytes of ``simulate(scene, copy=..., checked=False)``, with a number of `copies` for each. A scene
-    whose kernel differs is simulated alone.
+    Every response has the bytes of ``simulated(scene, copy=..., checked=False, spectra=False)``, with a number of `copies` for
+    each. A scene whose kernel differs is simulated alone.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for k, scene in enumerate(scenes):
@@ -108,12 +113,12 @@ def simulate_together(
     for numbers in groups.values():
         if len(numbers) == 1:
             (k,) = numbers
-            yield k, simulated(scenes[k], copy=copies[k], checked=False)
+            yield k, simulated(scenes[k], copy=copies[k], checked=False, spectra=False)
             continue
         first, *others = (scenes[k] for k in numbers)
         recording = steps.Recording(first, [copies[k] for k in numbers], beside=others)
         own = zip(numbers, recording.samples, strict=True)
-        collected = [Collected(scenes[k], one) for k, one in own]
+        collected = [Collected(scenes[k], one, spectra=False) for k, one in own]
         for rows in recording.chunks():
             for slot, one in enumerate(collected):
                 one.take(rows[rows[:, rec.SLOT] == slot])
@@ -243,11 +248,13 @@ def _prescribed(scene: Scene) -> Found:
 
 
 class Collected(Heard):
-    """Time series of one sample of a recording, as its steps come; raises InputError where they do not fit into memory."""
+    """Time series of one sample of a recording, as its steps come, and `spectra` if wanted, or if the scene has bands. Raises
+    InputError where they do not fit into memory."""
 
-    def __init__(self, scene: Scene, sample: steps.Recorded) -> None:
+    def __init__(self, scene: Scene, sample: steps.Recorded, spectra: bool) -> None:
         count = scene.output.instants_per_revolution
-        super().__init__(scene, sample, count, instants_of(scene, sample))
+        of_spectra = instants_of(scene, sample) if spectra or scene.bands() else 0
+        super().__init__(scene, sample, count, of_spectra)
         self._parts: list[dict[str, Array]] = []
         self._taken = 0
         self._kept, self._began = kept_revolutions(scene), 0.0
