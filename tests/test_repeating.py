@@ -20,9 +20,9 @@ def strip(content) -> None:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A directory with some samples and a response."""
+    """A directory with some samples and a response, whose objective is not that of the kernel."""
     place = tmp_path_factory.mktemp("made")
-    scene = load_scene(SCENE, CHEAP)
+    scene = load_scene(SCENE, [*CHEAP, "study.objective=peak-contact-force"])
     clearances = np.linspace(1e-4, 9e-4, 12)
     opened.write(evaluate(scene, {"C": clearances, "m2": clearances * 500}), place / "samples.nc")
     opened.write(simulate(scene), place / "response.nc")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
@@ -79,7 +80,7 @@ def _samples(content: Results, scene: Scene) -> Results:
     rows = labels.design_variables(content)
     values = {str(one.attrs.get("scene_path", one.name)): one.values for one in rows}
     points = as_points(scene, values)
-    records = evaluate_records(scene, points)
+    records = asked(evaluate_records(scene, points), scene.objective)
     named = replace(points, names=tuple(one.name for one in rows))
     return samples_of(named, records, {}, scene.objective, scene.joint_labels)
 
@@ -103,7 +104,8 @@ def _differing(ours: Results, theirs: Results) -> Iterator[str]:
         elif not np.array_equal(here, was, equal_nan=was.dtype.kind == "f"):
             first, second = here.astype(float), was.astype(float)
             off = np.nanmax(np.abs(first - second), initial=0.0)
-            yield f"{name} ({off / max(np.nanmax(np.abs(second), initial=0.0), 1e-300):.1e})"
+            far = f"{off / max(np.nanmax(np.abs(second), initial=0.0), 1e-300):.1e}"
+            yield f"{name} ({far if off > 0.0 else 'known in one only'})"
 
 
 def _changed(content: Results, scene: Scene) -> Iterator[str]:
