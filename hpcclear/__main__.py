@@ -46,9 +46,8 @@ def _leave(code: object) -> None:
             stream.flush()
     number = code if isinstance(code, int) else int(code is not None)
     if os.name == "posix":
-        ctypes.CDLL(None).exit(
-            number
-        )  # not os._exit: MPI libraries tell their launchers at the very end
+        # not os._exit: MPI libraries tell their launchers at the very end
+        ctypes.CDLL(None).exit(number)
     os._exit(number)
 
 

@@ -72,9 +72,8 @@ class Reader:
 
     def __init__(self, place: Path) -> None:
         made = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info")
-        made_here = shutil.ignore_patterns(
-            "results", "site"
-        )  # a room of the package is called so too
+        # a room of the package is called so too
+        made_here = shutil.ignore_patterns("results", "site")
 
         def ignored(folder: str, names: list[str]) -> set[str]:
             here = made_here(folder, names) if Path(folder) == ROOT else set()

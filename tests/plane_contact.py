@@ -14,9 +14,8 @@ def influence(size, alpha, beta):
     """Matrix (size, size): radial displacements (c) of both circles together by pressures on strips around the circle."""
     n = np.arange(2, size // 2)
     whole = 1.0 + alpha - 2.0 * beta  # of a uniform pressure
-    first = (
-        2.0 * math.log(2.0) - 1.5 - 0.5 * (alpha + beta)
-    )  # depth of small contacts as by Johnson
+    # depth of small contacts as by Johnson
+    first = 2.0 * math.log(2.0) - 1.5 - 0.5 * (alpha + beta)
     harmonics = np.zeros(size // 2 + 1)
     harmonics[0] = 0.5 * whole
     # cos t: of (2 sum cos nt n/(n^2-1)) a point load has none; the rigid shift is told by `first`

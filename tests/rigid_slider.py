@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-CRANK, ROD = (
-    (0.153, 0.038, 7.4e-5),
-    (0.306, 0.038, 5.9e-4),
-)  # length, mass, inertia about the middle
+# length, mass, inertia about the middle
+CRANK, ROD = ((0.153, 0.038, 7.4e-5), (0.306, 0.038, 5.9e-4))
 SLIDER, TURNING = 0.076, 2.7e-6
 HALF_LENGTH, HALF_HEIGHT, GAP = 0.05, 0.025, 0.001
 RESTITUTION, FRICTION, GRAVITY = 0.4, 0.01, 9.81

@@ -79,9 +79,8 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
     floor = integration.MARGIN * found["reference_error"][position]
     assert (found["error"][pairs, :, position] >= floor).all()
     assert (found["error"] >= found["reference_error"]).all()
-    np.testing.assert_array_equal(
-        found["error"][0], found["error"][1]
-    )  # single and in lanes: the same bits
+    # single and in lanes: the same bits
+    np.testing.assert_array_equal(found["error"][0], found["error"][1])
 
 
 @pytest.mark.parametrize(
@@ -236,9 +235,8 @@ def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
         assert again.attrs[name]
     closed = abs(measured["closed_form"])
     assert float(closed.sel(moment="mean")) < 1e-8
-    assert (
-        float(closed.sel(moment="deviation")) < 1e-2
-    )  # small beside the mean: digits cancel in both ways
+    # small beside the mean: digits cancel in both ways
+    assert float(closed.sel(moment="deviation")) < 1e-2
     r2 = measured["r2"].sel(surrogate="Kriging")
     assert float(r2[-1]) > 0.9
     error = measured["moment_error"].sel(moment="mean")

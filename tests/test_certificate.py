@@ -265,9 +265,8 @@ def test_cheaper_models_of_an_effect_are_tried_besides_its_absence():
     assert film == scene.films()["crank_rod"].model_copy(update={"model": "short"})
     sliding = off["sticking in joints"].effects.friction
     assert (sliding.law, sliding.coefficient) == ("coulomb", 0.1)
-    assert sliding.ramp_speed == pytest.approx(
-        0.1 / 50.0
-    )  # not as steep as Stribeck's speed would make it
+    # not as steep as Stribeck's speed would make it
+    assert sliding.ramp_speed == pytest.approx(0.1 / 50.0)
     assert not off["bending of rod"].bending()
     assert off["bending of rod beyond 2 modes"].modes == 2
     assert off["bending of rod beyond one mode"].modes == 1

@@ -56,9 +56,8 @@ def start(place: Path, *words: str, **settings: str) -> subprocess.CompletedProc
 
 @pytest.mark.parametrize("launcher", [[], [str(MPIEXEC), "-n", "2"]], ids=["alone", "mpiexec"])
 def test_a_process_takes_nothing_from_the_directory_it_starts_in(theirs, launcher):
-    words = isolated.python(
-        "hpcclear.base.width:doubles_in_a_vector"
-    )  # what it returns is the exit code
+    # what it returns is the exit code
+    words = isolated.python("hpcclear.base.width:doubles_in_a_vector")
     done = start(theirs, *launcher, *words, HPCCLEAR_CACHE=str(theirs.parent / "cache"))
     assert done.returncode in (2, 4, 8), done.stderr
 

@@ -208,9 +208,8 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
 
 
 def test_a_design_whose_verdict_the_tolerance_undoes_makes_way_for_others(monkeypatch):
-    monkeypatch.setattr(
-        tolerance.contest, "shown", lambda *_: 1.0
-    )  # all satisfied by samples alone
+    # all satisfied by samples alone
+    monkeypatch.setattr(tolerance.contest, "shown", lambda *_: 1.0)
     case = SimpleNamespace(kept=[Constraint(statistic="exceedance", limit=1.0, most=0.5)])
     study = SimpleNamespace(verification=Verification(), case=lambda name: case)
     designs = [Choice("", "made", {"m2": 0.1 * k}) for k in range(2)]

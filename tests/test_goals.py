@@ -149,9 +149,8 @@ def test_few_draws_have_limits_of_a_quantile_and_these_hold(order: float, shift:
         assert np.isfinite([found.lower, found.upper]).all()
         held += found.lower <= true <= found.upper
     assert held >= fewest(400, 0.95), held
-    twenty = quantile(
-        draws[:20], order, 0.95
-    )  # all lie below the quantile once in eight times, or more
+    # all lie below the quantile once in eight times, or more
+    twenty = quantile(draws[:20], order, 0.95)
     assert np.isnan(twenty.upper)
 
 

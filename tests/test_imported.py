@@ -98,9 +98,8 @@ def test_a_slider_of_pmks_may_be_one_joint(tmp_path):
         made = files.linkage_of(tmp_path / "p")["mechanism"]
         row = made["joints"]["C_guide"]
         assert (row["line"], row["angle"]) == (guide, "0.0 deg")
-        assert row["point"] == (
-            "BC.C" if flags == 13 else "slider_C.C"
-        )  # a welded one does not turn
+        # a welded one does not turn
+        assert row["point"] == ("BC.C" if flags == 13 else "slider_C.C")
     (tmp_path / "p").write_bytes(_project(crank, pin, f"7C,C,{d(6000)},0,0,,,,{d(500)}", *bars))
     with pytest.raises(InputError, match="driven along a line"):
         files.linkage_of(tmp_path / "p")

@@ -371,9 +371,8 @@ def test_recursion_cuts_where_the_kink_is(shift):
     assert single.leaves[0].names == ("x1", "x2")
     worse = accuracy(kinked(places), single.predict(places)).rmse
     better = accuracy(kinked(places), pieces.predict(places)).rmse
-    at_most(
-        np.log(better / worse), np.log(0.8)
-    )  # a quarter at most in fifty repeats; a cut elsewhere gains nothing
+    # a quarter at most in fifty repeats; a cut elsewhere gains nothing
+    at_most(np.log(better / worse), np.log(0.8))
 
 
 def test_a_smooth_function_stays_in_one_piece():

@@ -272,6 +272,5 @@ def test_the_command_ends_lives_at_their_limit(written):
     alive = (found.ended.values[:, None] > found.cycle.values).mean(axis=0)
     np.testing.assert_allclose(found.survival, alive)
     np.testing.assert_allclose(found.exceedance[:, 0], 1.0 - alive)
-    assert float(found.rank_correlation[0, 0]) == pytest.approx(
-        1.0
-    )  # the coefficient decides, over or not
+    # the coefficient decides, over or not
+    assert float(found.rank_correlation[0, 0]) == pytest.approx(1.0)

@@ -220,15 +220,13 @@ def test_every_drive_closes_the_energy(drive):
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     size = max(work, float(response["kinetic_energy"].max()))
     assert float(np.abs(response["energy_residual"]).max()) < 1e-5 * size
-    turns = float(response["drive_phase"][-1]) / (
-        2 * math.pi
-    )  # the angle itself swings with a harmonic drive
+    # the angle itself swings with a harmonic drive
+    turns = float(response["drive_phase"][-1]) / (2 * math.pi)
     assert turns == pytest.approx(4.0 if drive == "two turns" else 2.0, abs=0.1)
     found = evaluate(scene, {"mechanism.joints.o2.clearance": np.linspace(1e-4, 3e-4, 41)})
     assert (found["status"] == 0).all()
-    assert (
-        float(found["energy_error"].max()) < 5e-6
-    )  # 2.6e-6 at most of 4001 samples of every drive
+    # 2.6e-6 at most of 4001 samples of every drive
+    assert float(found["energy_error"].max()) < 5e-6
 
 
 def test_no_first_step_of_a_contact_is_its_last():

@@ -124,9 +124,8 @@ def test_objective_over_the_whole_box():
         stated = hard_cases.uncertainty(scene) / float(hard_cases.run(scene).outcome["objective"])
         found.append((abs(error(scene)), stated, k % 2 and contact["damping"] < 0.1))
     errors, stated, weak = np.array(found).T
-    assert (
-        np.quantile(errors[weak == 0.0], 0.95) < 1e-4
-    )  # a faint touch of the test above turns up now and then
+    # a faint touch of the test above turns up now and then
+    assert np.quantile(errors[weak == 0.0], 0.95) < 1e-4
     assert np.median(errors[weak == 0.0]) < 1e-5
     assert (errors < np.maximum(1e-4, 3.0 * stated)).mean() >= 0.95
 

@@ -270,9 +270,8 @@ def test_few_simulations_still_show_a_design_at_the_edge(carried_out, shift):
             shown += 1
             assert mass["heavy alpha"] == heaviest
             at_most(share["heavy alpha"], 1.0)
-            at_least(
-                share["heavy alpha"], 0.2
-            )  # a known part is sought, by a model that may be wrong by a factor of two
+            # a known part is sought, by a model that may be wrong by a factor of two
+            at_least(share["heavy alpha"], 0.2)
         # lighter ones are left open as they are: they cannot be better
         open_ = [k for k, one in codes.items() if one == Verdict.UNDECIDED and mass[k] > heaviest]
         # an interval that holds 1 within a factor of two; at the edge by the model, which may be as wrong

@@ -84,9 +84,8 @@ def test_a_scene_that_is_none_is_refused(made, tmp_path):
         content.attrs["scene"] = "mechanism = 3"
 
     for change in (forge, strip):
-        found = changed(
-            made, tmp_path, "samples.nc", change
-        )  # in a directory the others are compared all the same
+        # in a directory the others are compared all the same
+        found = changed(made, tmp_path, "samples.nc", change)
         assert found["unread"]
         assert str(found["extent"]).startswith("not simulated")
         with pytest.raises(InputError):

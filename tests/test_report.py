@@ -333,9 +333,8 @@ def test_the_mechanism_moves_when_asked(browser: Browser, page: Path) -> None:
     text = "return document.getElementById('motion-text').textContent;"
     rod = "return document.querySelectorAll('#mechanism polygon')[1].getAttribute('points');"
     still = browser.run(text)
-    assert (
-        browser.run("return document.getElementById('motion-play').textContent;") == "Play"
-    )  # reduced motion
+    # reduced motion
+    assert browser.run("return document.getElementById('motion-play').textContent;") == "Play"
     browser.run("document.getElementById('motion-play').focus();")
     browser.press("Enter")
     browser.wait(f"(() => {{ {text} }})() !== {json.dumps(still)}")

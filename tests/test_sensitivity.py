@@ -283,9 +283,8 @@ def test_limits_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_needed
     exact, ends = np.stack(truth()), np.array(limits)
     held = (ends[..., 0] <= exact + 1e-12) & (exact - 1e-12 <= ends[..., 1])
     at_least(np.count_nonzero(held), fewest(held.size, 0.93))
-    needed = 1.96 * np.std(
-        values, axis=0
-    )  # its own error from 100 designs is 7 %, and half of that in the mean of several
+    # its own error from 100 designs is 7 %, and half of that in the mean of several
+    needed = 1.96 * np.std(values, axis=0)
     wider = np.ptp(ends, axis=-1).mean(axis=0) / 2.0 / needed
     at_most(float(wider.mean()), 1.3)
     at_least(float(wider.mean()), 0.9)
@@ -293,9 +292,8 @@ def test_limits_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_needed
 
 def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: int) -> None:
     bounds = np.array([[0.0, 1.0], [5.0, 7.0], [-1e-3, 1e-3]])
-    found = sobol_indices(
-        lambda x: 1e6 + x.sum(axis=1), bounds, np.random.default_rng(shift), 4096
-    )  # a large mean must not spoil it
+    # a large mean must not spoil it
+    found = sobol_indices(lambda x: 1e6 + x.sum(axis=1), bounds, np.random.default_rng(shift), 4096)
     variances = np.ptp(bounds, axis=1) ** 2 / 12
     np.testing.assert_allclose(found.first, variances / variances.sum(), atol=2e-3)
     np.testing.assert_allclose(found.total, variances / variances.sum(), atol=2e-3)

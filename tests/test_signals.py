@@ -57,9 +57,8 @@ def test_all_that_a_mechanism_has_are_signals(response):
             assert sum(one.startswith(f"{name} ") for one in found) == variable.shape[1]
     for name in DERIVED:
         assert any(one.startswith(f"{name} ") for one in found)
-    assert (
-        len({one.label for one in found.values()}) >= len(found) - 2
-    )  # a single place has two names
+    # a single place has two names
+    assert len({one.label for one in found.values()}) >= len(found) - 2
 
 
 @pytest.mark.nightly  # compared below, and one identified in test_identify

@@ -148,9 +148,8 @@ def test_the_job_s_pin_changes_walls_and_follows_the_slot_without_clearance():
         )
     )
     apart = (found["body_angle"] - ideal["body_angle"].interp(time=found["time"])).sel(body="lever")
-    assert (
-        1e-4 < float(np.abs(apart).max()) < 2 * 5e-5 / 0.06
-    )  # clearance over the nearest place of the pin
+    # clearance over the nearest place of the pin
+    assert 1e-4 < float(np.abs(apart).max()) < 2 * 5e-5 / 0.06
     forces = found["contact_force"].to_numpy()
     assert (forces.max(axis=0) > 50.0).all()
     assert (forces.min(axis=1) == 0.0).all()  # one wall at a time

@@ -88,9 +88,8 @@ def test_limits_know_that_a_latched_motion_may_have_other_orbits():
     still, kept = (looked_at(lambda k: 0.0, target, 0.0, True) for target in (1e-2, 1e-3))
     assert still.limit == pytest.approx(6e-3, rel=1e-3)
     assert kept.limit < 1e-4  # at a stricter tolerance orbits are told apart
-    assert looked_at(lambda k: 0.0, 5e-3, 0.0, True).limit == pytest.approx(
-        5e-3
-    )  # not beyond the target
+    # not beyond the target
+    assert looked_at(lambda k: 0.0, 5e-3, 0.0, True).limit == pytest.approx(5e-3)
 
 
 def test_copies_that_come_together_are_told_from_those_that_stay_apart():

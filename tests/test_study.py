@@ -118,9 +118,8 @@ def test_true_moments_and_the_surrogate_meet_the_formula(results):
         assert int(one["samples"]) == 200
         assert int(one["failed"]) == 0
     names = found["design"].to_numpy().tolist()
-    assert (
-        4 <= sum("front" in name for name in names) <= 8
-    )  # those that cannot be told apart are one
+    # those that cannot be told apart are one
+    assert 4 <= sum("front" in name for name in names) <= 8
     assert sum("paper" in name for name in names) == 4
     paper = found.sel(design="first paper alpha")
     assert float(paper["mean_paper"]) == 1.7787e-4
@@ -281,9 +280,8 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
         assert 0.2 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]
     assert dict(made) == said
-    assert (
-        0.7 * extent.responses_of(scene) < responded["all"] <= extent.responses_of(scene)
-    )  # what is recommended is an end, or not
+    # what is recommended is an end, or not
+    assert 0.7 * extent.responses_of(scene) < responded["all"] <= extent.responses_of(scene)
 
 
 def test_the_share_of_chaos_is_that_of_the_pairs():

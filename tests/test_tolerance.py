@@ -105,6 +105,10 @@ def test_quantiles_and_probabilities_move_as_f_moved_and_stretched(shift):
     np.testing.assert_allclose(error[:2], 0.02 * values[:2], rtol=1e-9)  # independent of each other
     assert error[3] == pytest.approx(0.02 * np.hypot(values[0], values[3] - values[0]), rel=1e-9)
     assert (bias == 0.0).all()
+    taken = tolerance.Taken(np.full((1, 1, 2), 0.5), np.full((1, 1, 2), 0.5), 15)
+    true = truth.results_of(run, [choice], [whole])
+    true = tolerance._widened(run, [choice], [whole], true, taken)
+    assert (true["goal_lower"][0, 1], true["goal_upper"][0, 1]) == (0.0, 1.0)  # a probability
 
 
 def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():
@@ -192,9 +196,8 @@ def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeyp
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
     found = opened.read(tmp_path / "it" / "verification.nc")
     assert "tolerance dominates" in found.attrs["remarks"]
-    assert (
-        "Lower numerics.rtol, to 1e-07 say" in found.attrs["remarks"]
-    )  # 1.3 % of 0.25 % by halves
+    # 1.3 % of 0.25 % by halves
+    assert "Lower numerics.rtol, to 1e-07 say" in found.attrs["remarks"]
     assert (found["mean_within"] > 0.01).all()
 
 
@@ -225,9 +228,8 @@ def made(monkeypatch):
 def test_pairs_are_of_points_that_are_verified_anyway(tmp_path, made):
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
     found = opened.read(tmp_path / "it" / "verification.nc")
-    _, once = np.unique(
-        found["m2"], return_index=True
-    )  # an end may stand there under several names
+    # an end may stand there under several names
+    _, once = np.unique(found["m2"], return_index=True)
     assert made["verification", 1e-4] == found["samples"][once].sum()
     pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
     assert pairs == 64 * len(np.unique(found["m2"])) <= extent.samples_of(scene_of())["pairs"]

@@ -23,9 +23,8 @@ def uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array
     bits = np.random.Philox(_seed(seed, purpose, name))
     bits.advance(first // 4)
     numbers = np.random.Generator(bits).random(first % 4 + count)[first % 4 :]
-    return (
-        numbers + 2.0**-54
-    )  # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
+    # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
+    return numbers + 2.0**-54
 
 
 SOBOL_BITS = 30

@@ -307,19 +307,22 @@ def _widened(
         bias, error = _shares(run, choice, whole, taken.bias[k], taken.error[k])
         for place, name in enumerate(("mean_reach", "deviation_reach")):
             true[name][k] = bias[place] + np.hypot(true[name][k], far * error[place])
-        count, first = len(bias) - 3, len(run.study.case(choice.case).goals)
+        case = run.study.case(choice.case)
+        count, first = len(bias) - 3, len(case.goals)
+        shares = np.array([one.statistic == "exceedance" for one in (*case.goals, *case.kept)])
         sure = student(verdicts.level(settings, many[k], whole[0].size), taken.freedom)
         found = true["goal"][k, :count]
         true["taken"][k, : count - first] = (bias + sure * error)[3 + first :]
-        for name, values, part, times in (
-            ("percentile", true["percentile"][k : k + 1], slice(2, 3), far),
-            ("goal", found, slice(3, None), far),
-            ("sure", found[first:], slice(3 + first, None), sure),
+        for name, values, part, times, bounded in (
+            ("percentile", true["percentile"][k : k + 1], slice(2, 3), far, np.zeros(1, bool)),
+            ("goal", found, slice(3, None), far, shares),
+            ("sure", found[first:], slice(3 + first, None), sure, shares[first:]),
         ):
             for end, sign in (("lower", -1.0), ("upper", 1.0)):
                 ends = true[f"{name}_{end}"][k, ...].reshape(-1)[: len(values)]
                 reach = np.hypot(ends - values, times * error[part])
                 ends[:] = values + sign * (bias[part] + reach)
+                ends[bounded] = np.clip(ends[bounded], 0.0, 1.0)
     return verdicts.decided(run, designs, true)
 
 

@@ -54,9 +54,8 @@ class Problem:
     averaged: int
     max_steps: int
     implicit: str = "never"  # when lanes take implicit steps, a key of `IMPLICIT_USE`
-    cycle: float = (
-        at.TURN
-    )  # turn of the driven body in a revolution, rad: < 0 clockwise, 0 of a swing
+    # turn of the driven body in a revolution, rad: < 0 clockwise, 0 of a swing
+    cycle: float = at.TURN
     parameter_rows: int = at.OWN  # parameters of a sample
     curves: tuple[Pieces, ...] = ()  # its tables
     chosen: tuple[int, ...] = ()  # places of the joints whose gaps count for f; none for all
