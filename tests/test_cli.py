@@ -182,7 +182,7 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
             ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--checkpoint-interval", "nan"],
             "-interval",
         ),
-        (["frobnicate"], "No such command"),
+        (["chekc"], "No such command 'chekc'. Did you mean 'check'?"),
         (["sample", "jobs/quickstart.toml", "-o", "x.nc", "--points", "README.md"], "README.md"),
     ],
 )

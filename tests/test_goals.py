@@ -65,19 +65,19 @@ def test_words_tables_and_units_of_the_objective() -> None:
     assert [one.most for one in case.kept] == [0.4, 5e-4, 0.01]
     assert load_scene(scene.resolved()) == scene
     assert load_scene(QUICKSTART).required_study.case("robust").plain
-    force = scene.with_(
-        {
-            "study.objective": "mean-contact-force",
-            "study.cases": {"robust": {"random": RANDOM, "objectives": ["mean", {"statistic": "exceedance", "limit": "2 kN"}]}},
-        }
-    )  # fmt: skip
+    goals = ["mean", {"statistic": "exceedance", "limit": "2 kN"}]
+    cases = {"robust": {"random": RANDOM, "objectives": goals}}
+    force = scene.with_({"study.objective": "mean-contact-force", "study.cases": cases})
     assert force.required_study.case("robust").goals[1].limit == 2000.0
 
 
 @pytest.mark.parametrize(
     ("entries", "key", "reason"),
     [
-        ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "not one of the known"),
+        ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "'median': is not one of the known values. Did you"),
+        ({"constraints": [{"statistic": "percentile", "most": "5 kN"}]}, "constraints.0.statistic", "is a quantile"),
+        ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 5}]}, "constraints.0.most", "5: must be above 0 and"),
+        ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 0}]}, "constraints.0.most", "it is a probability"),
         ({"objectives": []}, "objectives", "needs an objective"),
         ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),
@@ -93,7 +93,7 @@ def test_goals_that_make_no_sense_are_refused(entries: dict[str, object], key: s
     with pytest.raises(InputError) as caught:
         with_case(**entries)
     assert caught.value.key == f"study.cases.robust.{key}"
-    assert reason in caught.value.reason
+    assert reason in str(caught.value)
     assert caught.value.remedy
 
 

@@ -93,7 +93,7 @@ def test_a_range_cuts_them_and_about_design_moves_them_along(scene_file):
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
-        ('{distribution="scipy:weibul_min", c=2}', "Did you mean 'weibull_min'?"),
+        ('{distribution="scipy:weibul_min", c=2, loc="3 N"}', "Did you mean 'weibull_min'?"),
         ('{distribution="scipy:poisson", mu=2}', "no continuous distribution 'poisson'"),
         ('{distribution="scipy:gamma", scale=1e-5}', r"C\.a = None: the distribution 'scipy:gamma'"),
         ('{distribution="scipy:gamma", a=2, shape=3}', r"C\.shape = 3: is not a parameter of scipy's"),
@@ -101,7 +101,7 @@ def test_a_range_cuts_them_and_about_design_moves_them_along(scene_file):
         ('{distribution="scipy:gamma", a="2 kg"}', "without a unit"),
         ('{distribution="scipy:norm", loc=5e-4, scale=1e-5, range=[1e-3, 2e-3]}', "less than 1e-09"),
         ('{distribution="scipy:gamma", a=4, parameters={a=4}}', r"C\.a = 4: is not a known key"),
-        ('{distribution="unform", half_width=1e-5}', "Did you mean 'uniform'.*lognormal"),
+        ('{distribution="unform", half_width="3 %"}', "Did you mean 'uniform'.*lognormal"),
         ('{distribution="mylaws:Faling", start=1, width=2}', r"mylaws\.py has no Faling.*'Falling'"),
         ('{distribution="mylaws:Falling", start=1}', "TypeError: .*missing.*'width'"),
         ('{distribution="mylaws:half"}', "has no ppf: a distribution needs ppf"),

@@ -16,7 +16,14 @@ from collections.abc import Iterator, Sequence
 import click
 
 from hpcclear import __version__
-from hpcclear.base.errors import InputError, LimitError, StorageError, check_address_space, mendable
+from hpcclear.base.errors import (
+    InputError,
+    LimitError,
+    StorageError,
+    check_address_space,
+    mendable,
+    nearest,
+)
 from hpcclear.base.remarks import listen
 from hpcclear.cli import commands
 from hpcclear.cli.options import GROUPS, Command, is_root, say
@@ -59,6 +66,8 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The name of a command, the command and its words, from those of the program."""
         new = OLD[args[0]].split() if args[0] in OLD else args[:1]
+        if new[0] not in (known := _names()) and not ctx.resilient_parsing:
+            raise click.UsageError(f"No such command {new[0]!r}. {nearest(new[0], known)}", ctx)
         return super().resolve_command(ctx, [*new, *args[1:]])
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

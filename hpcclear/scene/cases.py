@@ -1,22 +1,23 @@
 """Cases of a study: what is random in an optimisation, which statistics are minimised, and what designs must keep to."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import PrivateAttr, WithJsonSchema
 
 from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError, at
+from hpcclear.base.errors import at, nearest
 from hpcclear.base.objectives import ENDS, Objective, Usual
 from hpcclear.plugins import OBJECTIVES
-from hpcclear.scene.fields import NUMBER, Number, Quantity, Table, invalid
+from hpcclear.scene.fields import NUMBER, Number, Quantity, Table, hint, invalid
 from hpcclear.scene.named import NAME
 from hpcclear.scene.plugged import PluginName, as_invalid
 from hpcclear.scene.variables import StudyVariable
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
+Statistic = Literal["mean", "deviation", "quantile", "exceedance", "cost"]
 
 
 class ObjectiveName(PluginName):
@@ -39,7 +40,7 @@ class ObjectiveName(PluginName):
 class Goal(Table):
     """A statistic of f over the random inputs of a case, or a formula of its design variables."""
 
-    statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
+    statistic: Statistic | None = None
     """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all machines stays
     below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study variables."""
     of: str | None = None
@@ -153,16 +154,14 @@ def in_si(case: object, objective: object, key: str) -> object:
     """A case's row, of a list one with these random inputs, with objectives for their words, and `limit` and `most` in SI by
     the unit of the study's objective.
 
-    An error for validators where a limit is no number of that unit; its key begins with `key`.
+    An error for validators where a limit is no number of that unit, or a word that decides the unit is not known; the key of
+    a row begins with `key`.
     """
     if isinstance(case, (list, tuple)):
         return {"random": case}
     if not isinstance(case, Mapping):
         return case
-    try:
-        unit = OBJECTIVES.get(objective).unit  # type: ignore[arg-type]
-    except (InputError, AttributeError, TypeError):  # which the entry itself says
-        unit = ""
+    unit = _unit_of(objective, "objective")
     made = dict(case)
     for table in ("objectives", "constraints"):
         if isinstance(rows := made.get(table), (list, tuple)):
@@ -170,19 +169,30 @@ def in_si(case: object, objective: object, key: str) -> object:
     return made
 
 
+def _unit_of(response: object, key: str) -> str:
+    """Unit of a response; "" for what cannot be one, as its entry says; an error for validators where it is not known."""
+    if not isinstance(response, str):
+        return ""
+    with as_invalid(key):
+        return getattr(OBJECTIVES.get(response), "unit", "")
+
+
 def _goal(row: object, unit: str, key: str) -> object:
-    if isinstance(row, str):
-        return {"statistic": row}
-    if not isinstance(row, Mapping):
+    made = {"statistic": row} if isinstance(row, str) else row
+    if not isinstance(made, Mapping):
         return row
-    made = dict(row)
-    if isinstance(row.get("of"), str):
-        with as_invalid(f"{key}.of"):
-            unit = OBJECTIVES.get(row["of"]).unit
-    own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
-    for name, its in (("limit", unit), ("most", own)):
+    made, word = dict(made), made.get("statistic")
+    if isinstance(word, str) and word not in (known := get_args(Statistic)):
+        remedy = hint(word) + nearest(word, known)
+        raise invalid("is not one of the known values", remedy, f"{key}.statistic", word)
+    if isinstance(made.get("of"), str):
+        unit = _unit_of(made["of"], f"{key}.of")
+    most = Quantity(unit if word in ("mean", "deviation", "quantile") else "")
+    if word == "exceedance":
+        most = Quantity("", above=0, below=1, why="it is a probability")
+    for name, its in (("limit", Quantity(unit)), ("most", most)):
         if name in made:
-            made[name] = Quantity(its).convert(made[name], f"{key}.{name}")
+            made[name] = its.convert(made[name], f"{key}.{name}")
     return made
 
 

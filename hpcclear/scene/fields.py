@@ -40,6 +40,7 @@ HERE = {
     ("gear",): "There are no gears: two drives of given speeds turn two bodies.",
     ("lubric", "oil"): "Oil is the table film of a joint with clearance.",
     ("weight",): "Write mass, in kg.",
+    ("percentile",): 'A percentile is a quantile: statistic = "quantile", level = 0.9.',
     ("elasticmodulus", "emodulus", "modulus"):
         "Write bearing and journal = { youngs_modulus = ..., poisson_ratio = ... } of a joint.",
 }  # fmt: skip

@@ -107,6 +107,7 @@ def form_of(name: str, parameters: Mapping[str, float]) -> Form:
         return OURS[name]
     module, _, own = name.partition(":")
     if module == SCIPY:
+        _in_scipy(own)
         law: Any = partial(_of_scipy, own, parameters)
     else:
         with as_invalid("distribution"):
@@ -126,7 +127,7 @@ def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[st
     return found
 
 
-def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> quantiles.Cut:
+def _in_scipy(own: str) -> Any:
     from scipy import stats
 
     one = getattr(stats, own, None)
@@ -134,6 +135,11 @@ def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> qu
         known = [n for n, d in vars(stats).items() if isinstance(d, stats.rv_continuous)]
         reason = f"scipy.stats has no continuous distribution {own!r}"
         raise invalid(reason, nearest(own, known), "distribution")
+    return one
+
+
+def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> quantiles.Cut:
+    one = _in_scipy(own)
     shapes = tuple((one.shapes or "").replace(" ", "").split(",")) if one.shapes else ()
     for key in parameters:
         if key not in (*shapes, "loc", "scale"):
@@ -243,6 +249,7 @@ class RandomInput(NamedInput):
         row, paths = with_paths(row)
         quantity = quantities()[paths[0]]
         if not is_ours(row.get("distribution")):
+            form_of(row["distribution"], {})  # refuses an unknown one first
             row = _gathered(row, quantity.unit)
         offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
