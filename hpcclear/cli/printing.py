@@ -86,7 +86,8 @@ def describe_response(response: Results, output: Path, details: bool | None = No
 
 
 def fitted(first: Screen, most: int) -> list[Text]:
-    """Return a first screen in at most so many lines: rows of the table go first, then green lines, then advice."""
+    """Return a first screen in at most so many lines: rows of the table go first, then green lines, further advice,
+    amber lines beyond the third, and the most useful advice."""
     first = first.shown()
     rows, trust, steps = len(first.rows), len(first.trust), min(len(first.steps), 2)
     while True:
@@ -96,6 +97,10 @@ def fitted(first: Screen, most: int) -> list[Text]:
         if rows > 3:
             rows -= 1
         elif trust > 1 and first.trust[trust - 1].level is Level.GREEN:
+            trust -= 1
+        elif steps > 1:
+            steps -= 1
+        elif trust > 3 and first.trust[trust - 1].level is Level.AMBER:
             trust -= 1
         elif steps:
             steps -= 1

@@ -117,12 +117,12 @@ class Screen:
     def tables(self) -> "list[list[Sequence[str]]]":
         """Return figures and design in rows, heads first: one table where both stand beside today's, else one each."""
         if self.header[1:2] == ("today",):
-            tiles = ((t.label, t.before, t.value, t.within, t.change) for t in self.tiles)
+            tiles = ((t.label, t.before, t.value, t.change, t.within) for t in self.tiles)
             bounds = [row.span.bound if row.span else "" for row in self.rows]
             ends = (bound and f"at its {bound} bound" for bound in bounds)
             design = zip(self.rows, ends, strict=True)
-            rows = [(row.label, *row.cells, end, "") for row, end in design]
-            return [[("", *self.header[1:], "95 %, note", "change"), *tiles, *rows]]
+            rows = [(row.label, *row.cells, "", end) for row, end in design]
+            return [[("", *self.header[1:], "change", "95 %, note"), *tiles, *rows]]
         numbers = [(one.label, one.value, one.within) for one in self.tiles]
         rows = [(row.label, *row.cells) for row in self.rows]
         head = ("quantity", "value", "95 %, note")
