@@ -15,13 +15,13 @@ from own_engine import engine
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import WIDEST
 from hpcclear.base.verdict import Verdict
-from hpcclear.cli.printing import LINES, describe
+from hpcclear.cli.printing import LINES, describe, fitted
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import alike
 from hpcclear.report.answer import answer
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.page import write_report
-from hpcclear.report.screen import Level
+from hpcclear.report.screen import Level, Screen, Trust
 from hpcclear.report.screens import screen_of
 from hpcclear.results import dataset
 from hpcclear.study import run_study
@@ -149,6 +149,14 @@ def test_the_terminal_has_24_lines_of_80_columns(capsys):
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= 80
     assert "red" in " ".join(lines)
+    worries = tuple(Trust(Level.AMBER, f"worry {k}") for k in range(5))
+    few = fitted(Screen("What it is", trust=worries, steps=("most", "less")), 7)
+    assert [str(line).split()[-1] for line in few[-2:]] == ["2", "most"]
+    heads = next(line for line in lines if "today" in line).split("  ")
+    assert [one.strip() for one in heads if one][-2:] == [
+        "change",
+        "95 %, note",
+    ]  # a note may be long
 
 
 def test_an_original_that_is_best_is_kept():

@@ -53,6 +53,13 @@ def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
     assert wrong <= most(300, 0.05), wrong
 
 
+def test_looks_at_a_design_share_its_error():
+    """Half of it at the last, all of it at the end of the interval that can be wrong."""
+    settings, looks = Verification(most_samples=8192), [8192 >> k for k in range(7)]
+    tails = [(1.0 - verdicts.level(settings, 12, one)) / 2.0 for one in looks]
+    np.testing.assert_allclose(tails, 0.05 / 12 * 0.5 ** np.arange(1, 8), rtol=1e-9)
+
+
 def test_what_is_not_decided_has_a_price():
     """Half the reach needs four times the simulations; where nothing was exceeded the upper limit falls as one over them."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)

@@ -90,7 +90,9 @@ def test_what_chance_does_to_pairs_is_within_its_standard_error():
 
 @pytest.mark.parametrize("shift", [0.02, -0.02])
 def test_quantiles_and_probabilities_move_as_f_moved_and_stretched(shift):
-    rows = '[{statistic="quantile", level=0.9}, {statistic="exceedance", limit="1.1 m"}]'
+    rows = (
+        '[{statistic="quantile", level=0.9}, {statistic="exceedance", limit="1.1 m"}, "deviation"]'
+    )
     scene = scene_of(f'study.cases.play={{random=["C"], objectives={rows}}}')
     whole = np.stack([drawn(), np.zeros((16, 64))])
     part, none = np.full((1, 2), shift), np.zeros((1, 2))
@@ -109,6 +111,7 @@ def test_quantiles_and_probabilities_move_as_f_moved_and_stretched(shift):
     true = truth.results_of(run, [choice], [whole])
     true = tolerance._widened(run, [choice], [whole], true, taken)
     assert (true["goal_lower"][0, 1], true["goal_upper"][0, 1]) == (0.0, 1.0)  # a probability
+    assert true["goal_lower"][0, 2] == 0.0  # a standard deviation
 
 
 def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():

@@ -13,6 +13,7 @@ from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.session import samples_of
+from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
@@ -74,7 +75,11 @@ def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Datas
     InputError
         If a name is unknown, a design makes no mechanism, or the scene requests what the kernel cannot do.
     """
-    designs = as_points(scene, points)
-    records = asked(evaluate_records(scene, designs), scene.objective)
+    return evaluated(scene, as_points(scene, points)).to_xarray()
+
+
+def evaluated(scene: Scene, points: Points) -> Results:
+    """Simulate points as `evaluate` does; the content of a file of samples."""
+    records = asked(evaluate_records(scene, points), scene.objective)
     about = scene.origin | program() | recorded(scene, records), scene.objective, scene.joint_labels
-    return samples_of(designs, records, *about).to_xarray()
+    return samples_of(points, records, *about)

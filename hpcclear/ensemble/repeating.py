@@ -7,11 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import asked
-from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
-from hpcclear.ensemble.api import as_points
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.api import as_points, evaluated
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
@@ -80,14 +77,12 @@ def _samples(content: Results, scene: Scene) -> Results:
     rows = labels.design_variables(content)
     values = {str(one.attrs.get("scene_path", one.name)): one.values for one in rows}
     points = as_points(scene, values)
-    records = asked(evaluate_records(scene, points), scene.objective)
-    named = replace(points, names=tuple(one.name for one in rows))
-    return samples_of(named, records, {}, scene.objective, scene.joint_labels)
+    return evaluated(scene, replace(points, names=tuple(one.name for one in rows)))
 
 
 def _series(content: Results, scene: Scene) -> tuple[Results, Results]:
     """Series over time here and there; a study keeps those after the transient."""
-    ours = simulated(scene, checked=False)
+    ours = simulated(scene, checked=False, spectra=False)
     kept = {name: one for name, one in content.data_vars.items() if "time" in one.dims}
     return ours.isel(time=slice(ours.sizes["time"] - content.sizes["time"], None)), Results(kept)
 

@@ -107,7 +107,7 @@ def form_of(name: str, parameters: Mapping[str, float]) -> Form:
         return OURS[name]
     module, _, own = name.partition(":")
     if module == SCIPY:
-        _in_scipy(own)
+        _check_scipy(own)
         law: Any = partial(_of_scipy, own, parameters)
     else:
         with as_invalid("distribution"):
@@ -127,19 +127,19 @@ def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[st
     return found
 
 
-def _in_scipy(own: str) -> Any:
+def _check_scipy(own: str) -> None:
     from scipy import stats
 
-    one = getattr(stats, own, None)
-    if not isinstance(one, stats.rv_continuous):
+    if not isinstance(getattr(stats, own, None), stats.rv_continuous):
         known = [n for n, d in vars(stats).items() if isinstance(d, stats.rv_continuous)]
         reason = f"scipy.stats has no continuous distribution {own!r}"
         raise invalid(reason, nearest(own, known), "distribution")
-    return one
 
 
 def _of_scipy(own: str, parameters: Mapping[str, float], entries: Content) -> quantiles.Cut:
-    one = _in_scipy(own)
+    from scipy import stats
+
+    one = getattr(stats, own)
     shapes = tuple((one.shapes or "").replace(" ", "").split(",")) if one.shapes else ()
     for key in parameters:
         if key not in (*shapes, "loc", "scale"):

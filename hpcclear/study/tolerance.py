@@ -56,6 +56,9 @@ COST = 0.02
 NOTHING = 1e-9
 """Share of the mean below which a standard deviation is round-off."""
 
+FREE, LIMITS = (-np.inf, np.inf), {"exceedance": (0.0, 1.0), "deviation": (0.0, np.inf)}
+"""Between which a statistic lies, whatever the tolerance may take."""
+
 
 class Taken(NamedTuple):
     """What the tolerance takes of mean and standard deviation of responses of designs, f first: (n, responses, 2) each, over
@@ -309,20 +312,21 @@ def _widened(
             true[name][k] = bias[place] + np.hypot(true[name][k], far * error[place])
         case = run.study.case(choice.case)
         count, first = len(bias) - 3, len(case.goals)
-        shares = np.array([one.statistic == "exceedance" for one in (*case.goals, *case.kept)])
+        least, most = np.array(
+            [LIMITS.get(one.statistic or "", FREE) for one in (*case.goals, *case.kept)]
+        ).T
         sure = student(verdicts.level(settings, many[k], whole[0].size), taken.freedom)
         found = true["goal"][k, :count]
         true["taken"][k, : count - first] = (bias + sure * error)[3 + first :]
-        for name, values, part, times, bounded in (
-            ("percentile", true["percentile"][k : k + 1], slice(2, 3), far, np.zeros(1, bool)),
-            ("goal", found, slice(3, None), far, shares),
-            ("sure", found[first:], slice(3 + first, None), sure, shares[first:]),
+        for name, values, part, times, limits in (
+            ("percentile", true["percentile"][k : k + 1], slice(2, 3), far, FREE),
+            ("goal", found, slice(3, None), far, (least, most)),
+            ("sure", found[first:], slice(3 + first, None), sure, (least[first:], most[first:])),
         ):
             for end, sign in (("lower", -1.0), ("upper", 1.0)):
                 ends = true[f"{name}_{end}"][k, ...].reshape(-1)[: len(values)]
                 reach = np.hypot(ends - values, times * error[part])
-                ends[:] = values + sign * (bias[part] + reach)
-                ends[bounded] = np.clip(ends[bounded], 0.0, 1.0)
+                ends[:] = np.clip(values + sign * (bias[part] + reach), *limits)
     return verdicts.decided(run, designs, true)
 
 
