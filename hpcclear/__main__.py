@@ -46,7 +46,7 @@ def _leave(code: object) -> None:
             stream.flush()
     number = code if isinstance(code, int) else int(code is not None)
     if os.name == "posix":
-        # not os._exit: MPI libraries tell their launchers at the very end
+        # not os._exit: MPI libraries report to the launcher when the process exits
         ctypes.CDLL(None).exit(number)
     os._exit(number)
 
