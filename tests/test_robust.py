@@ -70,6 +70,14 @@ TRUNCATED = (
     RandomVariable("C", Normal(6e-4, 2e-4, 3e-4)),
     RandomVariable("u", Normal(0.02, 0.05, 0.04), about_design=True),
 )
+
+
+def drawn(count, seed):
+    """Independent draws of `UNIFORM`, in place of a rule."""
+    rng = np.random.default_rng(seed)
+    return {one.name: one.law(rng.random(count))[None] for one in UNIFORM}
+
+
 CASES = pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1]])
 
 
@@ -193,7 +201,7 @@ def test_derived_inputs_agree_with_a_fine_rule_and_with_samples():
     found, fine = objective(places), in_ratio(tolerance=1e-12)(places)
     assert abs((found - fine)[:, 0] / fine[:, 1]).max() < 1e-6
     assert abs(found[:, 1] / fine[:, 1] - 1).max() < 1e-6
-    sampled = objective.monte_carlo(places[:2], 1_000_000, np.random.default_rng(4))
+    sampled = sample_moments(objective.sampled(places[:2], drawn(1_000_000, 4)))
     assert (abs(found[:2, 0] - sampled.mean) < 3 * sampled.mean_error).all()
     assert (abs(found[:2, 1] - sampled.deviation) < 3 * sampled.deviation_error).all()
 
@@ -221,14 +229,12 @@ def pieces():
 
 
 def test_piecewise_model_is_averaged_over_draws():
-    with pytest.raises(InputError, match="monte-carlo"):
+    with pytest.raises(InputError, match="give draws"):
         RobustObjective(pieces(), DESIGN, UNIFORM)
-    objective = RobustObjective(
-        pieces(), DESIGN, UNIFORM, draws=(300_000, np.random.default_rng(6))
-    )
+    objective = RobustObjective(pieces(), DESIGN, UNIFORM, draws=lambda _: drawn(300_000, 6))
     places = designs(3)
     found = objective(places)
-    sampled = objective.monte_carlo(places, 300_000, np.random.default_rng(5))
+    sampled = sample_moments(objective.sampled(places, drawn(300_000, 5)))
     assert (abs(found[:, 0] - sampled.mean) < 5 * sampled.mean_error).all()
     assert (abs(found[:, 1] - sampled.deviation) < 5 * sampled.deviation_error).all()
 

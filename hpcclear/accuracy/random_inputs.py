@@ -14,7 +14,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.streams import generator
-from hpcclear.statistics.random.moments import sample_moments
+from hpcclear.statistics.random.moments import SampledMoments, sample_moments
 from hpcclear.statistics.surrogate.piecewise import Leaf
 from hpcclear.study.problem import problem_of
 
@@ -53,14 +53,19 @@ def measure(
     """
     problem = problem_of(scene, case, model)  # type: ignore[arg-type]
     _, design = middle_of(scene, case)
-    problem.objective.monte_carlo(design, 4, np.random.default_rng(0))  # compiles
+
+    def drawn(size: int, rng: np.random.Generator) -> SampledMoments:
+        draws = problem.independent(size, rng)(design)
+        return sample_moments(problem.objective.sampled(design, draws))
+
+    drawn(4, np.random.default_rng(0))  # compiles
     problem.objective(design)
     started = time.perf_counter()
     exact = problem.objective(design)[0]
     quadrature_seconds = time.perf_counter() - started
     try:
         closed = exact / problem.objective.closed_form(design)[0] - 1.0
-    except InputError:  # inputs derived from others have none
+    except InputError:  # inputs derived from others have none, nor has what is averaged over draws
         closed = np.full(len(MOMENTS), np.nan)
     sizes = np.array(profile.draws, np.int64)
     error = np.full((len(ESTIMATES), len(MOMENTS), len(sizes)), np.nan)
@@ -69,8 +74,7 @@ def measure(
     rng = generator(scene.required_study.seed, "accuracy", "draws")
     for k, size in enumerate(sizes):
         started = time.perf_counter()
-        drawn = problem.objective.monte_carlo
-        found = [drawn(design, int(size), rng) for _ in range(profile.blocks)]
+        found = [drawn(int(size), rng) for _ in range(profile.blocks)]
         seconds[0, k] = (time.perf_counter() - started) / profile.blocks
         table = np.array([[one.mean[0], one.deviation[0]] for one in found])
         error[0, :, k], lower[0, :, k], upper[0, :, k] = root_mean_square(table / exact - 1.0, 0)

@@ -16,7 +16,7 @@ def with_case(scene: Scene) -> tuple[Scene, str, str]:
     scene = scene.with_({"numerics.target_error": None})
     if scene.study is not None and scene.study.cases:
         case = scene.study.cases[-1].name
-        return _by_quadrature(scene), case, f"the scene's study, case {case}"
+        return scene, case, f"the scene's study, case {case}"
     if scene.study is not None:
         where = f"the scene's study, inputs uniform within {100 * SHARE:.0f} % of their range about a design"
     else:
@@ -29,11 +29,7 @@ def with_case(scene: Scene) -> tuple[Scene, str, str]:
             width = SHARE * (row.range[1] - row.range[0])
             random[row.name] = {"distribution": "uniform", "half_width": width}
     changes = {"study.random": random, "study.cases": {CASE: list(random)}}
-    return _by_quadrature(scene.with_(changes)), CASE, where
-
-
-def _by_quadrature(scene: Scene) -> Scene:
-    return scene.with_({"study.swarm.statistics": "quadrature"})
+    return scene.with_(changes), CASE, where
 
 
 def _variables(scene: Scene) -> dict[str, object]:

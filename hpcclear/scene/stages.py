@@ -134,10 +134,6 @@ class Swarm(Table):
     """Inertia weight at the first and at the last iteration; linear in between."""
     archive: Annotated[int, Count(2, 10**5)] = 100
     """Largest number of solutions of a front."""
-    statistics: Literal["quadrature", "monte-carlo"] = "quadrature"
-    """Method for mean and standard deviation over the random inputs."""
-    monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
-    """Number of samples per design, for "monte-carlo"."""
 
     def _check(self) -> None:
         if (self.algorithm or "").startswith("pymoo:") and self.particles < FEWEST:

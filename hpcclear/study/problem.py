@@ -2,7 +2,7 @@
 
 import contextlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,8 @@ class SwarmProblem:
     case: Case
     draws: Drawn
     """Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides."""
+    independent: Callable[[int, np.random.Generator], Drawn]
+    """So many independent draws, in place of those points."""
     further: tuple[RobustObjective, ...] = ()
     """As `objective`, of `Study.further`, responses besides f that cases require."""
 
@@ -100,29 +102,23 @@ class _Averages:
 
     def objective(self, model: Piecewise) -> RobustObjective:
         """Mean and standard deviation of f, by an exact rule where there is one."""
-        rng, settings = generator(self.study.seed, "moments", self.case), self.study.swarm
-        probes, exact = self.probes(rng), settings.statistics == "quadrature"
-        if self.moving or self.correlated or (exact and not model.separable):
-            return self.averaged(model, probes, self.drawn(self.chances(rng)))
-        if settings.statistics != "monte-carlo":
+        rng = generator(self.study.seed, "moments", self.case)
+        probes = self.probes(rng)
+        if not self.moving and not self.correlated and model.separable:
             with contextlib.suppress(InputError):  # length scales too short for a quadrature rule
                 return self.averaged(model, probes)
-        return self.averaged(model, probes, (settings.monte_carlo_samples, rng))
+        return self.averaged(model, probes, self.drawn(self.chances(rng)))
 
     def averaged(
-        self,
-        model: Piecewise,
-        probes: Array,
-        draws: tuple[int, np.random.Generator] | Drawn | None = None,
+        self, model: Piecewise, probes: Array, draws: Drawn | None = None
     ) -> RobustObjective:
         laws = [_inner(self.study, row) if self.moving else row.law for row in self.rows]
         each = zip(self.rows, laws, strict=True)
         inputs = [RandomVariable(row.name, law, not row.absolute) for row, law in each]
-        joint = self.joint if self.correlated and not self.moving else None
         variables = [self.study.variable(name) for name in self.study.optimisation]
         ratios = [_ratio(self.scene, x.paths[0]) for x in variables if x.ratio is not None]
         return RobustObjective(
-            model, self.names, inputs, derived=ratios, probes=probes, draws=draws, joint=joint
+            model, self.names, inputs, derived=ratios, probes=probes, draws=draws
         )
 
     def probes(self, rng: np.random.Generator) -> Array:
@@ -151,10 +147,9 @@ class _Averages:
 
         return of_designs
 
-    def joint(self, count: int, rng: np.random.Generator) -> dict[str, Array]:
-        """Independent draws of inputs that vary together."""
-        places = rng.random((len(self.random), count)) + 2.0**-54
-        return offsets(self.scene, self.random, list(places))
+    def independent(self, count: int, rng: np.random.Generator) -> Drawn:
+        """So many independent draws."""
+        return self.drawn(rng.random((len(self.rows), count)) + 2.0**-54)
 
 
 def problem_of(
@@ -163,15 +158,17 @@ def problem_of(
     """The problem of one case on a surrogate of its objective, and on those of further responses.
 
     A surrogate that is cut into subintervals has no exact rule, nor has one for inputs that vary together or on a kernel
-    that is no product of its inputs: these are averaged over points of a Sobol sequence. A model whose length scales are a
-    small part of a random input's range (it has found noise) is averaged by Monte Carlo.
+    that is no product of its inputs, nor where length scales are a small part of a random input's range (it has found noise):
+    these are averaged over points of a Sobol sequence.
     """
     averages, study = _Averages(scene, case), scene.required_study
     objective, region = averages.objective(model), box(scene, averages.names)
     points = averages.drawn(averages.chances(generator(study.seed, "goals", case)))
     probes = averages.probes(generator(study.seed, "moments", case))
     further = tuple(averages.averaged(other, probes, points) for other in others)
-    return SwarmProblem(averages.names, region, objective, scene, study.case(case), points, further)
+    return SwarmProblem(
+        averages.names, region, objective, scene, study.case(case), points, averages.independent, further
+    )  # fmt: skip
 
 
 def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:

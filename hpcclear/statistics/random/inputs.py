@@ -7,7 +7,6 @@ from math import prod
 import numpy as np
 
 from hpcclear.base.quantiles import Quantiles
-from hpcclear.statistics.random.rules import draw
 
 
 @dataclass(frozen=True)
@@ -82,10 +81,6 @@ class Wiring:
             moves = any(s in self.column for d in dims for s in self._sources(self.names[d]))
             groups.append(Group(tuple(dims), own, moves))
         return (*groups, *([Group(tuple(calm), (), True)] if calm else ()))
-
-    def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Independent draws of every random input, ``(1, samples)`` each."""
-        return {name: draw(one.law, samples, rng)[None] for name, one in self.random.items()}
 
     def corners(self, group: Group) -> dict[str, np.ndarray]:
         """The corners of a group's box of random inputs, as draws: an array of shape (corners,) for each input."""

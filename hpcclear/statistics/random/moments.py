@@ -73,10 +73,9 @@ class RobustObjective:
 
     `derived`: model inputs that are computed from designs and random inputs. The nodes of derived inputs that depend on a
     random one are chosen at the designs `probes` (m, k): spread them over the design space. `tolerance`: absolute error allowed
-    in the integral of any kernel (at most 1) over one random input. `draws`: Monte Carlo in place of quadrature: how many
-    draws, and what makes them; or a function of designs (n, k) that returns draws (n or 1, s) of each random input, which may
-    vary together then. Designs that see the same ones are ranked without noise. `joint`: of inputs that vary together,
-    independent draws (count,) of them all.
+    in the integral of any kernel (at most 1) over one random input. `draws`: Monte Carlo in place of quadrature, by a function
+    of designs (n, k) that returns draws (n or 1, s) of each random input, which may vary together then. Designs that see the
+    same ones are ranked without noise.
 
     Raises InputError: a random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
     support that leaves the surrogate's domain.
@@ -91,25 +90,19 @@ class RobustObjective:
         derived: Sequence[DerivedInput] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
-        draws: tuple[int, np.random.Generator] | Drawn | None = None,
-        joint: Callable[[int, np.random.Generator], Mapping[str, np.ndarray]] | None = None,
+        draws: Drawn | None = None,
     ) -> None:
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, derived)
-        self._draws: Drawn | None = None
-        self._joint = joint
-        if callable(draws):
-            self._draws = draws
-        elif draws is not None:
-            drawn = self._drawn(*draws)
-            self._draws = lambda designs: drawn
-        elif not model.separable:
+        self._draws = draws
+        if draws is not None:
+            return
+        if not model.separable:
             label = model.leaves[0].label
             reason = "the model is not a product of functions of single inputs"
-            raise InputError("surrogate", label, reason, 'use "monte-carlo"')
-        else:
-            (leaf,) = model.leaves
-            self._rule = TensorRule(leaf, self._wiring, tolerance, probes)  # type: ignore[arg-type]
+            raise InputError("surrogate", label, reason, "give draws")
+        (leaf,) = model.leaves
+        self._rule = TensorRule(leaf, self._wiring, tolerance, probes)  # type: ignore[arg-type]
 
     def __call__(self, designs: np.ndarray) -> np.ndarray:
         """Return mean and standard deviation of each design (n, k), shape (n, 2)."""
@@ -131,27 +124,14 @@ class RobustObjective:
         ]
         return np.concatenate(found) if found else np.empty((0, 1))
 
-    def monte_carlo(
-        self, designs: np.ndarray, samples: int, rng: np.random.Generator
-    ) -> SampledMoments:
-        """The same by Monte Carlo, `samples` fresh draws that all designs share, with errors."""
-        return sample_moments(self.sampled(designs, self._drawn(samples, rng)))
-
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
-        """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
+        """The same in error functions, ``(n, 2)``: of what has a quadrature rule, without derived inputs."""
         designs = self._checked(designs)
         leaf = self.model.leaves[0]
-        simple = self.model.separable and self._joint is None and not self._wiring.derived
-        if not (isinstance(leaf, Kriging) and simple):
+        if not isinstance(leaf, Kriging) or self._draws is not None or self._wiring.derived:
             reason = "the model has no closed form"
             raise InputError("model", self.model.names, reason, "compare with Monte Carlo")
         return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
-
-    def _drawn(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Draws of every random input, ``(1, samples)`` each."""
-        if self._joint is None:
-            return self._wiring.draw(samples, rng)
-        return {name: one[None] for name, one in self._joint(samples, rng).items()}
 
     def _checked(self, designs: np.ndarray) -> np.ndarray:
         """Designs as floats, after checking that their random inputs stay inside the domain."""

@@ -1,4 +1,4 @@
-"""What moments of surrogates need of distributions: draws, Gauss rules, integrals of a squared-exponential kernel.
+"""What moments of surrogates need of distributions: Gauss rules, integrals of a squared-exponential kernel.
 
 Of uniform and normal laws by formula, of samples by the values themselves, of any other by its quantile function
 (`hpcclear.base.quantiles`).
@@ -16,38 +16,13 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.quantiles import TAIL, Empirical, Normal, Quantiles, Uniform, truncated_quantile
+from hpcclear.base.quantiles import TAIL, Empirical, Normal, Quantiles, Uniform
 
 FINE = 400
 """Nodes of the inner products that define rules, and steps of a quantile function."""
 
 Rule = tuple[np.ndarray, np.ndarray]
 """Nodes and weights."""
-
-
-@singledispatch
-def draw(law: Quantiles, size: int, rng: np.random.Generator) -> Array:
-    """Independent draws, ``(size,)``; those of a normal are clipped to its span."""
-    return law(rng.random(size) + 2.0**-54)
-
-
-@draw.register
-def _(law: Uniform, size: int, rng: np.random.Generator) -> Array:
-    return rng.uniform(*law.span, size)
-
-
-@draw.register
-def _(law: Normal, size: int, rng: np.random.Generator) -> Array:
-    if law.reach == inf:
-        drawn = rng.normal(law.middle, law.deviation, size)
-    else:
-        drawn = law.middle + law.deviation * truncated_quantile(rng.random(size), *_limits(law))
-    return np.clip(drawn, *law.span)
-
-
-@draw.register
-def _(law: Empirical, size: int, rng: np.random.Generator) -> Array:
-    return rng.choice(np.array(law.values), size)
 
 
 @singledispatch

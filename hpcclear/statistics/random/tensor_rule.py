@@ -27,7 +27,7 @@ class TensorRule:
         self.leaf, self.wiring = leaf, wiring
         self.counts = self._choose(tolerance, probes)
         if prod(self.counts.values()) > MOST_TENSOR:
-            raise InputError("random_inputs", self.counts, "too many nodes", 'use "monte-carlo"')
+            raise InputError("random_inputs", self.counts, "too many nodes", "give draws")
         self.moving = [group for group in wiring.groups if group.moves]
         sizes = [prod(self.counts[name] for name in group.sources) for group in self.moving]
         self.sizes = np.array(sizes, dtype=np.int64)
@@ -95,7 +95,7 @@ class TensorRule:
                     counts[name] = self._probed(group, name, lengths, tolerance, probes)
                 if counts[name] == 0:
                     reason = f"needs more than {MOST_NODES} nodes: it spans many length scales"
-                    remedy = 'narrow it, loosen the tolerance, or use "monte-carlo"'
+                    remedy = "narrow it, loosen the tolerance, or give draws"
                     raise InputError(name, self.wiring.random[name].law, reason, remedy)
         return counts
 
