@@ -1,6 +1,5 @@
 """Errors a user can mend: one message with key, value, reason and remedy."""
 
-import difflib
 import errno
 import os
 import platform
@@ -73,13 +72,17 @@ def at(key: str, value: object = ...) -> Iterator[None]:
 
 def _alike(word: str, one: str) -> float:
     """How alike a word is to a dotted path, which is more alike where the word, or its last part, is a part of it."""
+    from difflib import SequenceMatcher  # only who errs waits for it
+
     shared = (word.rpartition(".")[2] in one.split(".")) + (word in one)
-    return shared + difflib.SequenceMatcher(None, word[:80], one).ratio()
+    return shared + SequenceMatcher(None, word[:80], one).ratio()
 
 
 def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
-    close = difflib.get_close_matches(word[:80], words, n=3, cutoff=0.6)
+    from difflib import get_close_matches
+
+    close = get_close_matches(word[:80], words, n=3, cutoff=0.6)
     # whoever writes the beginning of a name means it
     close.sort(key=lambda one: not one.startswith(word))
     if close:

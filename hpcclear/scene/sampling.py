@@ -33,14 +33,21 @@ def _chances(
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
     if replicates is None:
         return [uniform(seed, f"monte-carlo {purpose}", name, first, count) for name in names]
-    parts = [_scrambled(seed, purpose, one, len(names), span) for one in replicates]
+    sequences = [(seed, purpose, one, len(names)) for one in replicates]
+    if first + count <= _BEGINNING:
+        parts = [_scrambled(*one, 0, _BEGINNING)[first : first + count] for one in sequences]
+    else:
+        parts = [_scrambled(*one, *span) for one in sequences]
     return list(np.concatenate(parts).T)
 
 
+_BEGINNING = 128  # points of a sequence that are kept together
+
+
 @lru_cache(maxsize=128)
-def _scrambled(seed: int, purpose: str, replicate: int, size: int, span: tuple[int, int]) -> Array:
+def _scrambled(seed: int, purpose: str, replicate: int, size: int, first: int, count: int) -> Array:
     """Points of a randomised sequence, (count, size), read only: all designs of a study meet the same."""
-    points = sobol(size, generator(seed, f"sobol {purpose}", str(replicate)), *span)
+    points = sobol(size, generator(seed, f"sobol {purpose}", str(replicate)), first, count)
     points.flags.writeable = False
     return points
 

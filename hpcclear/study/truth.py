@@ -40,7 +40,7 @@ def scattered(
         run.scene, count, random=random, design=dict(choice.design), purpose=purpose,
         first=first or 0, replicate=None if first is None else range(REPLICATES),
     )  # fmt: skip
-    return run.simulations.filled(points.names, points.values)
+    return run.simulations.filled(points.names, points.values, checked=True)
 
 
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:

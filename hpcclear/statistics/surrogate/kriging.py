@@ -124,8 +124,8 @@ class Kriging:
         as in `predict`.
         """
         points = inside(points, self.names, self.lower, self.upper)
-        cross = self._covariance(self.to_unit(self.inputs), self.to_unit(points))
-        steps = solve_triangular(self._factor, cross, lower=True)
+        cross = self._covariance(self._unit, self.to_unit(points))
+        steps = self._solved(cross)
         known = np.einsum("ij,ij->j", steps, steps)
         return self.scale**2 * np.maximum(self.signal_variance - known, 0.0)
 
@@ -134,13 +134,13 @@ class Kriging:
         nearest training point of each, in squared units of the training values."""
         unit, inputs = self.to_unit(inside(points, self.names, self.lower, self.upper)), self._unit
         cross = self._covariance(inputs, unit)
-        steps = solve_triangular(self._factor, cross, lower=True)
+        steps = self._solved(cross)
         if one is None:
             steps -= self._steps[:, cross.argmax(axis=0)]
             shared = cross.max(axis=0)
         else:
             place = self.to_unit(one[None])
-            steps -= solve_triangular(self._factor, self._covariance(inputs, place), lower=True)
+            steps -= self._solved(self._covariance(inputs, place))
             shared = self._covariance(unit, place)[:, 0]
         left = 2.0 * (self.signal_variance - shared) - np.einsum("ij,ij->j", steps, steps)
         return np.asarray(self.scale**2 * np.maximum(left, 0.0))
@@ -148,8 +148,8 @@ class Kriging:
     def covariance(self, points: np.ndarray) -> np.ndarray:
         """Joint Kriging covariance (n, n) of the smooth part at points (n, d), in squared units of the training values."""
         unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
-        cross = self._covariance(self.to_unit(self.inputs), unit)
-        steps = solve_triangular(self._factor, cross, lower=True)
+        cross = self._covariance(self._unit, unit)
+        steps = self._solved(cross)
         known = steps.T @ steps
         return np.asarray(self.scale**2 * (self._covariance(unit, unit) - known))
 
@@ -160,9 +160,11 @@ class Kriging:
     @cached_property
     def _steps(self) -> Array:
         """What is known at the training points themselves, as `apart` takes it, (n, n)."""
-        return np.asarray(
-            solve_triangular(self._factor, self._covariance(self._unit, self._unit), lower=True)
-        )
+        return self._solved(self._covariance(self._unit, self._unit))
+
+    def _solved(self, cross: Array) -> Array:
+        """What multiplied by the factor gives covariances with the training values, (n, m)."""
+        return np.asarray(solve_triangular(self._factor, cross, lower=True, check_finite=False))
 
     @cached_property
     def _factor(self) -> Array:
