@@ -107,9 +107,9 @@ def simulate_together(
     each. A scene whose kernel differs is simulated alone.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
+    kernels = {scene: kernel_of(scene) for scene in set(scenes)}
     for k, scene in enumerate(scenes):
-        kernel = kernel_of(scene)
-        groups.setdefault((k,) if kernel is None else kernel, []).append(k)
+        groups.setdefault(kernels[scene] or (k,), []).append(k)
     for numbers in groups.values():
         if len(numbers) == 1:
             (k,) = numbers

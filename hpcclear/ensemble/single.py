@@ -132,7 +132,10 @@ class Responses:
 
     def _records(self, taken: Sequence[tuple[int, int, int]]) -> Iterator[np.ndarray]:
         """Yield records (1,) of responses, simulated in one batch."""
-        scenes = [self._scene.with_(self._variants[variant]) for _, variant, _ in taken]
+        made = {
+            k: self._scene.with_(self._variants[k]) for k in {variant for _, variant, _ in taken}
+        }
+        scenes = [made[variant] for _, variant, _ in taken]
         for k, response in simulate_together(scenes, [copy for _, _, copy in taken]):
             record, values = np.zeros(1, self._dtype), self._evaluate(scenes[k], response)
             record["sample"], record["values"] = taken[k][0], values.ravel()
