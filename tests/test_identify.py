@@ -107,7 +107,7 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
         read_measured(blind, "crank_moment", "N m", SPEED)
     for words, reason in (
         ("joints.crank_rod.clearance", "is not PATH=LO:HI"),
-        ("joints.crank_rod.clearance=2um:1um", "do not rise"),
+        ("joints.crank_rod.clearance=2um:1um", "bounds are crossed"),
         ("joints.crank_rod.clearance=1um:5kg", "kg"),
         ("joints.crank_rod.clearanc=1um:5um", "clearanc"),
         ("joints.crank_rod.clearance=1um:30mm", "as large as the bearing"),

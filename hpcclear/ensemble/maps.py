@@ -1,12 +1,14 @@
 """The `map` command: one or two entries of a scene over a grid, and at each point what the motion does."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.errors import InputError, at
-from hpcclear.base.units import UnitError, note, to_si
+from hpcclear.base.units import note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import Finished, Options, Session, sample_points, samples_of, saving
@@ -17,6 +19,7 @@ from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE
 from hpcclear.results.places import Place
 from hpcclear.scene import Scene
+from hpcclear.scene.fields import Quantity
 from hpcclear.scene.points import Points, check_points
 
 if TYPE_CHECKING:
@@ -28,24 +31,19 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
 
     Raises InputError if the words do not say that.
     """
-    name, _, rest = words.partition("=")
-    parts = rest.split(":")
-    example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
-    wrong = InputError("map", words, "is not PATH=LO:HI:N", example)
-    if len(parts) != 3 or not name:
-        raise wrong
+    found = re.fullmatch(r"([^=]+)=([^:]+):([^:]+):\s*(0*[1-9]\d{0,8})\s*", words)
+    if found is None:
+        example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
+        raise InputError("map", words, "is not PATH=LO:HI:N", example)
+    name, *ends, count = found.groups()
     paths = paths_of(scene, name)
-    unit = scene.unit(paths[0])
-    try:
-        low, high = (_number(part, unit) for part in parts[:2])
-        count = int(parts[2])
-    except UnitError as error:
-        raise InputError("map", words, error.reason, error.remedy) from None
-    except ValueError:
-        raise wrong from None
-    if count < 1 or not np.isfinite([low, high]).all():
-        raise wrong
-    return name, paths, np.linspace(low, high, count)
+    return name, paths, np.linspace(*range_of("map", words, ends, scene.unit(paths[0])), int(count))
+
+
+def range_of(key: str, words: str, ends: Sequence[str], unit: str) -> tuple[float, float]:
+    """Two bounds in rising order, each in SI or with a unit; raises InputError at `key`, which has `words`."""
+    with at(key, words):
+        return Quantity(unit).range([_number(end, unit) for end in ends], "")
 
 
 def _number(words: str, unit: str) -> float:

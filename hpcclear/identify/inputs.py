@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
-from hpcclear.ensemble.maps import number_of
+from hpcclear.ensemble.maps import range_of
 from hpcclear.identify.signals import Sensor
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import quantities
@@ -41,11 +41,7 @@ class Unknown:
             remedy = "For example joints.crank_rod.clearance=10um:150um"
             raise InputError("--unknown", words, "is not PATH=LO:HI", remedy)
         paths = paths_of(scene, name)
-        unit = scene.unit(paths[0])
-        lower, upper = (number_of("--unknown", end, unit) for end in ends)
-        if not lower < upper:
-            raise InputError("--unknown", words, "its bounds do not rise", "Swap them")
-        return cls(name, paths, lower, upper)
+        return cls(name, paths, *range_of("--unknown", words, ends, scene.unit(paths[0])))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.maps import number_of
+from hpcclear.ensemble.maps import number_of, range_of
 from hpcclear.identify.signals import Sensor
 
 MEMBERS = 256
@@ -77,7 +77,7 @@ class Settings:
         low, high = (self.band or "").partition(":")[::2]
         place, quality = (self.resonance or "").partition(":")[::2]
         return Sensor(
-            (number_of("--band", low or "0", "Hz"), number_of("--band", high or "1e12", "Hz")),
+            range_of("--band", self.band or ":", (low or "0", high or "1e12"), "Hz"),
             number_of("--resonance", place or "1e12", "Hz"),
             number_of("--resonance", quality or "10", "1"),
             self.gain_error,
