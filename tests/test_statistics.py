@@ -149,17 +149,13 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
         run_statistics(scene, output, ranks, samples=8000, options=QUIET)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("versions", "numba 0.1"), ("processor", "another one")]
-)
-def test_statistics_go_on_only_with_the_same_versions_and_processor(
-    tmp_path, monkeypatch, name, value
-):
+@pytest.mark.parametrize("name", ["versions", "processor"])
+def test_statistics_go_on_only_with_the_same_versions_and_processor(tmp_path, monkeypatch, name):
     scene, output = scene_of(5000), tmp_path / "statistics.nc"
     run_statistics(scene, output, alone(), options=QUIET)
-    changed = {**provenance.program(), name: value}
-    monkeypatch.setattr(identity, "program", lambda: changed)
-    with pytest.raises(InputError, match="another run"):
+    program = provenance.program()  # what differs is shown, though it comes last in a long text
+    monkeypatch.setattr(identity, "program", lambda: program | {name: f"{program[name]}, numba 0"})
+    with pytest.raises(InputError, match=rf"another run \({name}: \S.* there, .*, numba 0 now"):
         run_statistics(scene, output, alone(), options=QUIET)
 
 

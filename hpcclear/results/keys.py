@@ -1,6 +1,7 @@
 """The key of a run in its files: what makes it the run it is, by which the same run goes on and another is refused."""
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from hpcclear.results.content import Results
 
 KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
+
+SHOWN = 40
+"""Characters of a value in a message, at most."""
 
 
 def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
@@ -24,7 +28,7 @@ def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
     """
     found = key_of(content)
     pairs = {name: (found.get(name), key.get(name)) for name in sorted({*found, *key})}
-    shown = [f"{n}: {_short(a)} there, {_short(b)} now" for n, (a, b) in pairs.items() if a != b]
+    shown = [f"{name}: {_apart(*pair)}" for name, pair in pairs.items() if pair[0] != pair[1]]
     if shown:
         listed = shown if len(shown) <= 10 else [*shown[:10], f"and {len(shown) - 10} more"]
         reason = f"it contains results of another run ({'; '.join(listed)})"
@@ -41,6 +45,12 @@ def key_of(content: Results) -> dict[str, object]:
     return found if isinstance(found, dict) else {}
 
 
-def _short(value: object) -> str:
-    text = "nothing" if value is None else str(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+def _apart(there: object, now: object) -> str:
+    """Two values in words; of long ones the part from a little before the place where they begin to differ."""
+    texts = ["nothing" if value is None else str(value) for value in (there, now)]
+    same = os.path.commonprefix(texts)  # noqa: RUF071 - texts, not places
+    if len(same) > SHOWN // 2:
+        first = max(same.rfind(", ") + 2, len(same) - SHOWN // 2)
+        texts = [f"...{text[first:]}" for text in texts]
+    before, after = (text if len(text) <= SHOWN else f"{text[:SHOWN]}..." for text in texts)
+    return f"{before} there, {after} now"
