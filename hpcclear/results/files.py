@@ -72,35 +72,35 @@ def write_bytes(path: Path, content: Buffer, mark: bytes = b"") -> None:
     fails, or a file size limit is met.
     """
     refuse_foreign(path, mark)
-    try:
-        with _opened(path) as (directory, name):
-            if not any(_replaced(name, content, directory) for _ in range(_ATTEMPTS)):
-                raise OSError(errno.EIO, "temporary files are removed at once")
-            if directory is not None:
-                fsync_directory(directory)
-    except OSError as error:
-        raise refused(path, error) from None
+    with _opened(path) as (directory, name):
+        if not any(_replaced(name, content, directory) for _ in range(_ATTEMPTS)):
+            raise OSError(errno.EIO, "temporary files are removed at once")
+        if directory is not None:
+            fsync_directory(directory)
 
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[tuple[int | None, str]]:
     """The open directory of a file and the name in it: a link swapped in meanwhile cannot lead elsewhere.
 
-    None and the whole path where the system opens no directories.
+    None and the whole path where the system opens no directories. Errors of the system within name the file itself.
     """
-    if not _OPENS_DIRECTORIES:
-        yield None, str(path)
-        return
-    directory = os.open(path.parent, host.flags("O_RDONLY", "O_DIRECTORY"))
     try:
-        yield directory, path.name
-    finally:
-        os.close(directory)
+        if not _OPENS_DIRECTORIES:
+            yield None, str(path)
+            return
+        directory = os.open(path.parent, host.flags("O_RDONLY", "O_DIRECTORY"))
+        try:
+            yield directory, path.name
+        finally:
+            os.close(directory)
+    except OSError as error:
+        raise refused(path, error) from None
 
 
 def _replaced(name: str, content: Buffer, directory: int | None) -> bool:
     """Write aside and rename; False if somebody removed the temporary in between."""
-    temporary = os.path.join(os.path.dirname(name), f".hpcclear-{secrets.token_hex(8)}.tmp")
+    temporary = _aside(name)
     try:
         _write_whole(temporary, content, directory)
         try:
@@ -112,6 +112,11 @@ def _replaced(name: str, content: Buffer, directory: int | None) -> bool:
             os.unlink(temporary, dir_fd=directory)
         raise
     return True
+
+
+def _aside(name: str) -> str:
+    """A new name beside a file, one of `TEMPORARY`."""
+    return os.path.join(os.path.dirname(name), f".hpcclear-{secrets.token_hex(8)}.tmp")
 
 
 def remove_leftovers(directory: Path) -> None:
@@ -149,6 +154,8 @@ def probe(path: Path, mark: bytes = b"") -> None:
     `mark`: of the kind of file, as for `write_bytes`. Raises InputError, StorageError as `write_bytes`.
     """
     refuse_foreign(path, mark)
-    trial = path.with_name(f".hpcclear-{secrets.token_hex(8)}.tmp")
-    write_bytes(trial, b"", mark)
-    trial.unlink(missing_ok=True)
+    with _opened(path) as (directory, name):
+        trial = _aside(name)
+        _write_whole(trial, b"", directory)
+        with contextlib.suppress(FileNotFoundError):  # a run that starts took it for a leftover
+            os.unlink(trial, dir_fd=directory)
