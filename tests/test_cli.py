@@ -103,6 +103,7 @@ def test_a_response_that_did_not_end_is_written_and_told(tmp_path):
     done = hpcclear(*words, "--set", "numerics.max_steps=100")
     assert done.returncode == 1
     assert done.stderr.startswith("Error: step_cap: numerics.max_steps was reached")
+    assert (done.stdout + done.stderr).count("See with hpcclear check") == 1
     found = opened.read(out, "response")
     assert np.isnan(found["objective"])
     assert found.sizes["time"] > 10

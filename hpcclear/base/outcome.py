@@ -37,51 +37,51 @@ class Status(IntEnum):
         one._value_, one.message, one.remedy = code, message, remedy
         return one
 
-    OK = 0, "finished", "nothing to do"
+    OK = 0, "finished", "Nothing to do"
     STEP_CAP = (
         1,
         "numerics.max_steps was reached before the last revolution ended",
-        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
+        "See with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
         "if all are correct, raise numerics.max_steps",
     )
     STEP_TOO_SMALL = (
         2,
         "the step size fell below the resolution of the time",
-        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range, or a bar bends too far",
+        "Loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range, or a bar bends too far",
     )
     NOT_FINITE = (
-        3, "the state became infinite or undefined", "check masses, stiffness and clearance of this sample"
+        3, "the state became infinite or undefined", "Check masses, stiffness and clearance of this sample"
     )  # fmt: skip
     STALLED = (
         4,
         "the crank stopped before the requested revolutions were complete",
-        "raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
+        "Raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
     )
     NEAR_SINGULAR = (
         6,
         "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "
         "or the motion is not determined",
-        'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
+        'Change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
     )
     WORN_THROUGH = (
         7,
         "a clearance has grown to a quarter of its bearing's radius, so the bearing is worn through",
-        "give wear.limit a threshold that ends a service life earlier, or check wear coefficients and lengths of bearings",
+        "Give wear.limit a threshold that ends a service life earlier, or check wear coefficients and lengths of bearings",
     )
     JUMP_TOO_SHORT = (
         8,
         "no extrapolation jump over the averaged revolutions meets wear.tolerance",
-        "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
+        "Loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
     )
     CANNOT_TURN = (
         9,
         "the linkage cannot turn: without clearance it locks within a turn of its drives, or cannot be assembled",
-        "change lengths, points or angles so that it turns; hpcclear check of this design shows where it locks",
+        "Change lengths, points or angles so that it turns; hpcclear check of this design shows where it locks",
     )
     TORN_THROUGH = (
         10,
         "a journal penetrated its bearing by more than a quarter of the bearing's radius",
-        "check masses, speed, loads and contact stiffness, and whether the mechanism can move",
+        "Check masses, speed, loads and contact stiffness, and whether the mechanism can move",
     )
 
     @property

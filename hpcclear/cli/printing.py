@@ -117,8 +117,9 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
     if first.doubt:
         yield from (Text(line, "bold red") for line in _wrapped(f"Indicative only: {first.doubt}"))
     yield from map(Text, _wrapped("; ".join(filter(None, first.about))))
-    yield Text("")
-    for shown in replace(first, rows=first.rows[:rows]).tables():
+    if tables := replace(first, rows=first.rows[:rows]).tables():
+        yield Text("")
+    for shown in tables:
         yield from _columns(shown)
     if rows < len(first.rows):
         yield Text(f"and {len(first.rows) - rows} more")

@@ -158,4 +158,4 @@ def _refuse_if_all_failed(records: np.ndarray, stage: str) -> None:
     codes, counts = np.unique(records["status"], return_counts=True)
     worst = Status(int(codes[counts.argmax()]))
     reason = f"all of these simulations failed, most often because {worst.message}"
-    raise InputError(stage, len(records), reason, worst.remedy.capitalize())
+    raise InputError(stage, len(records), reason, worst.remedy)

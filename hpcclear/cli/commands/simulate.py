@@ -52,6 +52,6 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
         return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
-    said = response.attrs.get("ended", f"{status.name.lower()}: {status.message}")
-    cli.say(f"Error: {said}. {status.remedy}")
+    said = response.attrs.get("ended", status.message)
+    cli.say(f"Error: {status.name.lower()}: {said}")  # its remedy stands on the screen above
     return Exit.FAILED

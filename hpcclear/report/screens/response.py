@@ -18,10 +18,7 @@ def screen(response: Results, content: Content) -> Screen:
     status = Status(int(response["status"]))
     if not status.valid:
         said = f"The simulation failed: {response.attrs.get('ended', status.message)}"
-        trust = (red(status.remedy, "bearings"),)
-        return Screen(
-            said, doubt="no number of it is a result", trust=trust, steps=(status.remedy,)
-        )
+        return Screen(said, doubt="no number of it is a result", steps=(status.remedy,))
     loads = bearings.bearings(response)
     header = ("bearing", "peak force", "at crank angle", "mean force", "contact")
     beyond = bool(int(response["flags"]) & Flag.BEYOND_HERTZ)
