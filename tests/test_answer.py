@@ -16,6 +16,7 @@ from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import WIDEST
 from hpcclear.base.verdict import Verdict
 from hpcclear.cli.printing import LINES, describe, fitted
+from hpcclear.cli.tables import console, table
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import alike
 from hpcclear.report.answer import answer
@@ -108,9 +109,8 @@ def opened(content, **more):
 
 def test_the_first_screen_has_the_design_beside_todays_with_changes_and_intervals():
     first = opened(verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN)))
-    assert (
-        first.headline == "Recommended design: 50 % lower mean gap, 33 % lower standard deviation"
-    )
+    gains = "50 % lower mean gap, 33 % lower standard deviation"
+    assert first.headline == f"Recommended design: {gains}"
     mean, deviation, percentile = first.tiles
     assert mean[1:] == ("0.2 mm", "0.4 mm", "\u221250 %", "± 0.5 %", True)
     assert deviation[1:] == ("40 µm", "60 µm", "\u221233 %", "± 2.5 %", True)
@@ -150,13 +150,18 @@ def test_the_terminal_has_24_lines_of_80_columns(capsys):
     assert max(map(len, lines)) <= 80
     assert "red" in " ".join(lines)
     worries = tuple(Trust(Level.AMBER, f"worry {k}") for k in range(5))
-    few = fitted(Screen("What it is", trust=worries, steps=("most", "less")), 7)
+    few = fitted(Screen("What it is", trust=worries, steps=("most", "less")), 6)
     assert [str(line).split()[-1] for line in few[-2:]] == ["2", "most"]
     heads = next(line for line in lines if "today" in line).split("  ")
-    assert [one.strip() for one in heads if one][-2:] == [
-        "change",
-        "95 %, note",
-    ]  # a note may be long
+    shown = [one.strip() for one in heads if one]
+    assert shown[-2:] == ["change", "95 %, note"]  # a note may be long
+
+
+def test_a_table_that_is_too_wide_for_its_words_is_turned(capsys):
+    console().print(table("", [["1 ± 2", *["b" * 20] * 3]] * 2, ["half-width", *"xyz"]))
+    out = capsys.readouterr().out
+    assert "half-width   1 ± 2                  1 ± 2" in out
+    assert out.count("b" * 20) == 6
 
 
 def test_an_original_that_is_best_is_kept():

@@ -4,12 +4,10 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from rich import box
-from rich.table import Table
 
 from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.cli.options import detailed
-from hpcclear.cli.tables import console
+from hpcclear.cli.tables import console, table
 from hpcclear.cli.terminal import counted, show_rows
 from hpcclear.ranks.progress import duration
 from hpcclear.ranks.terminal import WIDTH
@@ -44,20 +42,16 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
     row = next((row for row in plan.rows if row.error == error), plan.rows[0])
     job = plan.simulations, plan.workers
     command = "sample" if plan.study is None else "run"
-    made = Table(
-        title=f"{command}: {plan.simulations} simulations on {counted(plan.workers)}", title_justify="left",
-        box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0),
-    )  # fmt: skip
-    for name in ("error of f", "settings", "ms/sample", "core-h", "wall time"):
-        short = name != "settings"
-        made.add_column(name, no_wrap=short, overflow="fold", justify="right" if short else "left")
+    rows = []
     for one in plan.rows:
         reached = "as in file" if one.error is None else f"{one.error:.0e}"
         spread = f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""
         hours = f"{plan.core_seconds(one, *job) / 3600:.2g}"
         wall = duration(plan.wall_seconds(one, *job))
-        made.add_row(reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall)
-    out.print(made)
+        rows.append((reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall))
+    title = f"{command}: {plan.simulations} simulations on {counted(plan.workers)}"
+    header = ("error of f", "settings", "ms/sample", "core-h", "wall time")
+    out.print(table(title, rows, header))
     show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == ON_SCREEN])
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row):

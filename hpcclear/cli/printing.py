@@ -89,25 +89,16 @@ def fitted(first: Screen, most: int) -> list[Text]:
     """Return a first screen in at most so many lines: rows of the table go first, then green lines, further advice,
     amber lines beyond the third, and the most useful advice."""
     first = first.shown()
-    rows, trust, steps = len(first.rows), len(first.trust), min(len(first.steps), 2)
-    while True:
-        lines = list(_lines(first, rows, trust, steps))
-        if len(lines) <= most or (rows <= 1 and trust <= 1 and not steps):
-            return lines[:most]
-        if rows > 3:
-            rows -= 1
-        elif trust > 1 and first.trust[trust - 1].level is Level.GREEN:
-            trust -= 1
-        elif steps > 1:
-            steps -= 1
-        elif trust > 3 and first.trust[trust - 1].level is Level.AMBER:
-            trust -= 1
-        elif steps:
-            steps -= 1
-        elif rows > 1:
-            rows -= 1
-        else:
-            trust -= 1
+    red, amber, _ = ([one.level for one in first.trust].count(level) for level in Level)
+    left = {"rows": len(first.rows), "trust": len(first.trust), "steps": min(len(first.steps), 2)}
+    order = (
+        ("rows", 3), ("trust", max(red + amber, 1)), ("steps", 1), ("trust", max(red, 3)),
+        ("steps", 0), ("rows", 1), ("trust", 1),
+    )  # fmt: skip
+    for part, least in order:
+        while len(lines := list(_lines(first, **left))) > most and left[part] > least:
+            left[part] -= 1
+    return lines[:most]
 
 
 def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:

@@ -28,13 +28,36 @@ def console() -> Console:
     return _PlainConsole(highlight=False, width=width)
 
 
-def table(title: str, rows: Iterable[Iterable[str]], header: Sequence[str] = ()) -> Table:
-    """Columns below their headings, as wide as the terminal allows; without these two: what, and its value."""
+def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> Table:
+    """Columns below their headings, as wide as the terminal allows; without these two: what, and its value.
+
+    Where the columns are too narrow for their words, the rows stand beside each other if these are not.
+    """
     made = Table(
         title=title or None, title_justify="left", box=box.SIMPLE_HEAD, show_header=bool(header), pad_edge=False
     )  # fmt: skip
-    for k, head in enumerate(header or ("", "")):
-        made.add_column(head, overflow="fold", no_wrap=not (header or k))
-    for row in rows:
+    cells: Sequence[Sequence[str]] = [header or ("", ""), *rows]
+    widths = _widths(cells) if header else None
+    if header and widths is None and (widths := _widths(turned := [*zip(*cells, strict=True)])):
+        cells = turned
+    for k, head in enumerate(cells[0]):
+        width = widths[k] if widths else None
+        made.add_column(head, overflow="fold", no_wrap=not (header or k), width=width)
+    for row in cells[1:]:
         made.add_row(*row)
     return made
+
+
+def _widths(cells: Sequence[Sequence[str]]) -> list[int] | None:
+    """Widths of columns that break no word or interval, the widest narrowed alike; None where these do not fit the terminal."""
+    columns = [[one.replace(" ± ", "_±_") for one in column] for column in zip(*cells, strict=True)]
+    natural, least = (
+        [max(len(part) for one in column for part in split(one) or [""]) for column in columns]
+        for split in (str.splitlines, str.split)
+    )
+    room = WIDTH - 3 * len(columns) + 1  # between two columns stand three blanks, one at each end
+    for most in range(max(natural), 0, -1):
+        found = [max(word, min(whole, most)) for whole, word in zip(natural, least, strict=True)]
+        if sum(found) <= room:
+            return found
+    return None
