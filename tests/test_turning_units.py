@@ -176,6 +176,7 @@ MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_spee
           "drive.expected_speed: '1200 min^-1'"]),
         ("linkages/three_rrr.toml", [], ["servo0.frequency: 10 Hz", "servo1.frequency: 20 Hz", "servo2.frequency: 10 Hz"]),
         ("linkages/press.toml", [], ["speed: 300 rpm"]),
+        ("tolerances.toml", [], ["random C12, u2, m3; lowest cost, 95th percentile of f; 95th percentile of f at most 1.5 kN"]),
     ],
 )  # fmt: skip
 def test_check_prints_every_speed_and_every_frequency(job, settings, shown):

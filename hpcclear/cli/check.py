@@ -165,6 +165,13 @@ def _study_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     study = scene.required_study
     yield "samples", f"{study.samples} ({DRAWN[study.method]}), seed {study.seed}"
     yield "objective", f"{study.objective}: {scene.objective.words}"
+    unit = scene.objective.unit
+    for case in study.cases:
+        parts = [f"random {', '.join(case.random)}"]
+        parts.append(f"lowest {', '.join(one.words(unit) for one in case.goals)}")
+        bounds = ((one.words(unit), scene.in_unit(one.most, one.unit(unit))) for one in case.kept)
+        parts += (f"{words} at most {most}" for words, most in bounds)
+        yield f"case {case.name}", "; ".join(parts)
     if not detailed():
         short = {"variables": study.variables, "random": (*study.random, *study.worn)}
         for label, named in short.items():
@@ -180,7 +187,7 @@ def _study_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     if any(case.kept for case in study.cases):
         from hpcclear.study import verdicts
 
-        yield from (("constraint", text) for text in verdicts.costs(study, scene.objective.unit))
+        yield from (("constraint", text) for text in verdicts.costs(study, unit))
     for row in study.worn:
         from hpcclear.study import lives
 
