@@ -54,7 +54,7 @@ KIND = ResultKind(
         "constraint_most": number("design constraint", "", "largest allowed value of that quantity"),
         "constraint_verdict": flag("design constraint",
             "whether the design satisfies the constraint, significantly over all designs and looks",
-            "kept broken undecided absent"),
+            "satisfied violated undecided absent"),
         "constraint_price": number("design constraint", "1",
             "simulations of the design that would decide; infinite if the integration tolerance leaves it open"),
         "constraint_excess": number("design", "1",
