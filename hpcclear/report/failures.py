@@ -76,7 +76,6 @@ def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
         inside &= (one.values >= low) & (one.values <= high)
         whole = labels.between(float(one.values.min()), float(one.values.max()), one.unit)
         ends = labels.between(low, high, one.unit)
-        ends = labels.quantity(low, one.unit) if low == high else ends
         ranges.append(f"{one.name} {ends} (range {whole})")
     return f"all at {', '.join(ranges)}, where {int(failed.sum())} of {int(inside.sum())} failed"
 

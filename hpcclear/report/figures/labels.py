@@ -179,12 +179,12 @@ def paired(value: float, half_width: float) -> str:
 
 
 def between(low: float, high: float, units: str) -> str:
-    """Return the ends of an interval in words, with enough digits to differ."""
-    for digits in range(4, 8):
+    """Return the ends of an interval in words, with enough digits to differ; one value where they are equal."""
+    for digits in range(4, 8 if low < high else 5):
         ends = quantities((low, high), units, digits)
         if ends[0] != ends[1]:
             break
-    return " to ".join(ends)
+    return " to ".join(dict.fromkeys(ends))
 
 
 def of(variable: Variable) -> Scale:

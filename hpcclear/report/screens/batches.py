@@ -48,14 +48,14 @@ def samples(found: Results, content: Content) -> Screen:
     headline = "Every simulation failed"
     if np.isfinite(f).any():
         headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"
-        ends = (labels.quantity(float(end(f)), unit) for end in (np.nanmin, np.nanmax))
-        rows.insert(0, ScreenRow("range of f", (" to ".join(ends), "")))
+        ends = labels.between(float(np.nanmin(f)), float(np.nanmax(f)), unit)
+        rows.insert(0, ScreenRow("range of f", (ends, "")))
     if "mean of f" in shown:
         headline = f"mean of f {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
     share = _share(found, Flag.BEYOND_HERTZ)
     return Screen(
         labels.sentence(headline, found),
-        (f"f: {labels.objective(found)}", f"{len(f)} simulations", varied),
+        (f"f: {labels.objective(found)}", f"{len(f)} simulation{'s' * (len(f) > 1)}", varied),
         "the contact model is outside its range" if share > MOST else "",
         tiles,
         ("statistic", "value", "95 % CI") if rows else (),
