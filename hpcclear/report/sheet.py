@@ -65,13 +65,16 @@ class SheetContent(NamedTuple):
         return [f"{label} {text}" for label, text in self.origin if label in _HEAD]
 
 
-def write_sheet(*places: str | Path, output: str | Path | None = None) -> Path:
+def write_sheet(
+    *places: str | Path, output: str | Path | None = None, troubles: list[str] | None = None
+) -> Path:
     """Write a sheet (sheet.pdf) from result files; equal files of one day give equal bytes.
 
     Arguments and errors as of `hpcclear.report.html.page.write_report`; the output ends in ``.pdf``, ``.svg`` or ``.png``.
     """
     style.matplotlib()
-    content, troubles = read(*places), list[str]()
+    content, troubles = read(*places), [] if troubles is None else troubles
+    troubles += content.troubles
     sheet = sheet_of(content, attempt("The first screen", partial(screen_of, content), troubles))
     wanted = (*sheet.screen.figures, gallery.MECHANISM)
     drawn = gallery.figures(content, troubles, wanted, PICTURES)

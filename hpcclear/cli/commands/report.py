@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from hpcclear.cli import options as cli
+from hpcclear.cli.terminal import print_remark
 
 
 @cli.command("look", "Write figures and an HTML page.")
@@ -21,7 +22,9 @@ def run(places: tuple[Path, ...], output: Path | None, sheet: bool, trust: bool)
     from hpcclear.report.html.page import write_report
     from hpcclear.report.sheet import write_sheet
 
-    write = write_sheet if sheet else write_report
+    write, troubles = write_sheet if sheet else write_report, list[str]()
     with trusting(trust):
-        place = write(*places, output=output and cli.place_of(output))
+        place = write(*places, output=output and cli.place_of(output), troubles=troubles)
+    for text in troubles:
+        print_remark("Warning", text)
     cli.show(f"{'sheet' if sheet else 'report'}  {place}")

@@ -51,25 +51,27 @@ class Subject(NamedTuple):
     figures: list[dict[str, str]]
 
 
-def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
+def write_report(
+    *places: str | Path, output: str | Path | None = None, troubles: list[str] | None = None
+) -> Path:
     """Write a page from the result files in a directory, or from chosen ones; what is missing in a directory is said on the
     page.
 
     `places`: a directory with any of the files of `run`, `sample`, `accuracy` and `simulate`, or files of theirs; `output`: the
-    page, by default report.html in the directory, or in that of the first file. Returns the page. Raises InputError: no such
-    directory, no result in it, a chosen file that is none, matplotlib missing, or no permission to write. Raises StorageError:
-    the disk is full or fails.
+    page, by default report.html in the directory, or in that of the first file; `troubles`: a list that takes a sentence on
+    each file or part that was left out. Returns the page. Raises InputError: no such directory, no result in it, a chosen file
+    that is none, matplotlib missing, or no permission to write. Raises StorageError: the disk is full or fails.
     """
-    content = read(*places)
+    content, troubles = read(*places), [] if troubles is None else troubles
     path = content.directory / NAME if output is None else Path(output)
     with in_units_of(content.attribute("scene")):
-        files.write_bytes(path, _page(content).encode(), _MARK)
+        files.write_bytes(path, _page(content, troubles).encode(), _MARK)
     return path
 
 
-def _page(content: Content) -> str:
+def _page(content: Content, troubles: list[str]) -> str:
     """The whole document."""
-    troubles = list(content.troubles)
+    troubles += content.troubles
 
     def drawn_by_script() -> dict[str, Any]:
         made = picture.picture(content)
