@@ -61,6 +61,12 @@ class Span(NamedTuple):
     bound: str = ""
     """The end that it sits on: "lower", "upper"; "" for none."""
 
+    @property
+    def words(self) -> str:
+        """The same in words."""
+        where = "at" if round(self.after, 4) in (0.0, 1.0) else "near"
+        return self.bound and f"{where} its {self.bound} bound"
+
 
 class ScreenRow(NamedTuple):
     """A line of the table of the first screen."""
@@ -118,8 +124,7 @@ class Screen:
         """Return figures and design in rows, heads first: one table where both stand beside today's, else one each."""
         if self.header[1:2] == ("today",):
             tiles = ((t.label, t.before, t.value, t.change, t.within) for t in self.tiles)
-            bounds = [row.span.bound if row.span else "" for row in self.rows]
-            ends = (bound and f"at its {bound} bound" for bound in bounds)
+            ends = (row.span.words if row.span else "" for row in self.rows)
             design = zip(self.rows, ends, strict=True)
             rows = [(row.label, *row.cells, "", end) for row, end in design]
             return [[("", *self.header[1:], "change", "95 %, note"), *tiles, *rows]]
