@@ -22,6 +22,7 @@ from functools import lru_cache
 from math import isfinite, pi
 
 from hpcclear.base import unit_names
+from hpcclear.base.holding import holding
 from hpcclear.base.unit_names import HEADS, LONGEST, TAILS, UNITS, NoUnit
 from hpcclear.base.unit_names import UnitError as UnitError
 
@@ -132,11 +133,8 @@ _NOTED: ContextVar[Callable[[str, str], None] | None] = ContextVar("noted", defa
 @contextmanager
 def noting(take: Callable[[str, str], None]) -> Iterator[None]:
     """Within it, `take` gets each text that leaves its unit open, and a sentence that says how it is read."""
-    token = _NOTED.set(take)
-    try:
+    with holding(_NOTED, take):
         yield
-    finally:
-        _NOTED.reset(token)
 
 
 def note(text: str, read: str) -> None:

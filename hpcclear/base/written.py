@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import NamedTuple
 
+from hpcclear.base.holding import holding
 from hpcclear.base.plain import plain
 from hpcclear.base.units import TEXTS, factor, is_written_in, spelled
 
@@ -33,11 +34,8 @@ _SCALED = re.compile(r"[num\u00b5\u03bckMG]?(?:m|N|J|W|Pa|s|Hz)|k?g|rad")
 @contextmanager
 def reading(texts: Texts) -> Iterator[None]:
     """Within it, texts of quantities that are read are kept in `texts`, and `shown` knows them."""
-    token = TEXTS.set(texts)
-    try:
+    with holding(TEXTS, texts):
         yield
-    finally:
-        TEXTS.reset(token)
 
 
 def text_of(value: float, target: str) -> str:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.generated import run_text
+from hpcclear.base.holding import holding
 
 REFERENCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,39}):([A-Za-z_][A-Za-z0-9_]{0,79})")
 """``"module:Name"``."""
@@ -40,11 +41,8 @@ def using(texts: Mapping[str, str]) -> Iterator[dict[str, str]]:
     Yields versions of the packages whose plug-ins were taken meanwhile, by package.
     """
     packages: dict[str, str] = {}
-    token = _reading.set(_Reading(texts, packages))
-    try:
+    with holding(_reading, _Reading(texts, packages)):
         yield packages
-    finally:
-        _reading.reset(token)
 
 
 def texts_in_use() -> Mapping[str, str]:
@@ -63,11 +61,8 @@ def note_package(package: str, version: str) -> None:
 @contextlib.contextmanager
 def trusting(trust: bool = True) -> Iterator[None]:
     """In this block source text that a result file carries may be run."""
-    token = _trusted.set(trust)
-    try:
+    with holding(_trusted, trust):
         yield
-    finally:
-        _trusted.reset(token)
 
 
 def is_trusting() -> bool:

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.holding import holding
 from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Quantity, Tables, table_at
@@ -59,11 +60,8 @@ def of_kinds(content: Tables) -> Iterator[None]:
     kinds = {name: str(row.get("kind")) for name, row in rows if isinstance(row, Mapping)}
     found = {f"mechanism.loads.{name}": kind for name, kind in kinds.items()}
     _SEEN.update(found)
-    token = _kinds.set(found)
-    try:
+    with holding(_kinds, found):
         yield
-    finally:
-        _kinds.reset(token)
 
 
 def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:

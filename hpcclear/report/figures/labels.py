@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.holding import holding
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
 from hpcclear.base.units import factor
@@ -204,11 +205,8 @@ _paths: ContextVar[dict[str, str] | None] = ContextVar("entries on axes", defaul
 def called() -> Iterator[dict[str, str]]:
     """Collect within it what entries of the scene stand on axes: their paths, by their words there."""
     found: dict[str, str] = {}
-    token = _paths.set(found)
-    try:
+    with holding(_paths, found):
         yield found
-    finally:
-        _paths.reset(token)
 
 
 def axis(variable: Variable) -> str:

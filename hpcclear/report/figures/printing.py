@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.holding import holding
 from hpcclear.base.units import UnitError, to_si
 from hpcclear.report.figures import theme as colours
 
@@ -71,11 +72,8 @@ def printing(
     if font:
         rc |= _font(font)
     user = Printing(rc, height, dict(texts or {}))
-    token = wanted.set(user)
-    try:
+    with holding(wanted, user):
         yield
-    finally:
-        wanted.reset(token)
     for name in user.texts:
         if name not in user.used:
             reason = "no axis of these figures is called so"

@@ -19,6 +19,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.holding import holding
 from hpcclear.report.figures import labels
 from hpcclear.report.figures.printing import Printing, renamed, wanted
 from hpcclear.report.figures.theme import DASHES as DASHES
@@ -128,12 +129,12 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
         bound = signature.bind(*args, **kwargs).arguments
         values = {name: taken(name, one) for name, one in bound.items()}
         user = wanted.get()
-        token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
+        given = None if ax is None else list(np.ravel(np.asarray(ax, dtype=object)))
         default = matplotlib().rcParamsDefault
         usual = {"figure.figsize": (column.get() * MM, 60.0 * MM)}
         rc = {**default, **RC, **usual, **user.rc, "text.usetex": False, "backend": "agg"}
         try:
-            with matplotlib().rc_context(rc), labels.called() as paths:
+            with holding(_given, given), matplotlib().rc_context(rc), labels.called() as paths:
                 every = several(values.get("response"))
                 figure = _beside(function, every, values) if every else function(**values)
                 panels = _given.get() or figure.axes
@@ -147,8 +148,6 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
                 raise
             reason = f"{error.args[0]!r} is needed, and not among the arrays"
             raise InputError(next(iter(bound)), sorted(bound), reason, "Add it") from error
-        finally:
-            _given.reset(token)
 
     given = inspect.Parameter("ax", inspect.Parameter.KEYWORD_ONLY, default=None)
     parameters = [*signature.parameters.values(), given]
@@ -179,8 +178,7 @@ def _beside(
 ) -> "Figure":
     """A column for each of several responses, under its name."""
     state = _Columns(list(every))
-    token = _columns.set(state)
-    try:
+    with holding(_columns, state):
         for state.here, (name, one) in enumerate(every.items()):
             figure = function(**{**values, "response": one})
             mine = [axes for (column, _), axes in state.panels.items() if column == state.here]
@@ -192,8 +190,6 @@ def _beside(
             if state.here:
                 for panel in mine:
                     panel.set_ylabel("")
-    finally:
-        _columns.reset(token)
     return figure
 
 
