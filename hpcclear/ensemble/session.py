@@ -284,10 +284,7 @@ def design(scene: Scene, table: Path | None) -> Points:
     """
     if table is not None:
         return read_points(table, scene)
-    if scene.study is None:
-        remedy = "Add a [study] table; hpcclear sample also takes a table (--points designs.csv)"
-        raise InputError("study", None, "the scene has no [study] table", remedy)
-    if (method := scene.study.method) == "lhs":
+    if (method := scene.required_study.method) == "lhs":
         points = latin_hypercube(scene)
     else:
         sequence = 0 if method == "qmc" else None

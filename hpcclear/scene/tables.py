@@ -67,7 +67,8 @@ class SceneTables(Table):
         """The study of a scene that needs one; raises InputError if it has none."""
         if self.study is None:
             remedy = "Add [study] and [study.variables], as in jobs/quickstart.toml"
-            raise InputError("study", None, "the scene has no study", remedy)
+            more = "hpcclear sample also takes designs from a table (--points)"
+            raise InputError("study", None, "the scene has no study", f"{remedy}; {more}")
         return self.study
 
     @property
