@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -18,7 +17,7 @@ from hpcclear.scene.variables import StudyVariable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.regression import Regression, RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import arrays_of, models_in, rows_of
 from hpcclear.statistics.surrogate.subintervals import Method, SubintervalSettings, fit_subintervals
@@ -67,7 +66,7 @@ def fit_all(run: StudyRun) -> Result:
             max_depth=more if settings.cuts is None else settings.cuts,
         )
         model = fit_subintervals(
-            partial(_simulated, run, names), region.bounds, wanted,
+            partial(run.simulations.values, names, stage=STAGE), region.bounds, wanted,
             method=method, rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
             snap=partial(snapped, run.study, names, model=True),
@@ -75,10 +74,6 @@ def fit_all(run: StudyRun) -> Result:
         result |= {f"model{k}_{name}": array for name, array in arrays_of(model).items()}
         result |= _checked(run, k, model)
     return result
-
-
-def _simulated(run: StudyRun, names: Sequence[str], points: Array) -> Array:
-    return run.simulations.values(names, points, STAGE)
 
 
 def simulations(study: Study) -> int:
@@ -156,7 +151,10 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     checks = np.array([result[f"model{k}_check"] for k, _ in leaves])
     data |= {name: checks[:, column] for column, name in enumerate(_CHECKS)}
     data["family"] = np.array([families[k] for k, _ in leaves])
-    names = [_label(models[k], families[k], leaf) for k, leaf in leaves]
+    names = [
+        f"{families[k]} {models[k].leaves.index(leaf) + 1}" if models[k].leaves[1:] else families[k]
+        for k, leaf in leaves
+    ]
     points = np.arange(data["training_output"].shape[1])
     coords = {"model": np.array(names), "point": points, "parameter": np.array(parameters)}
     about = None, _units(run), run.scene.objective, run.words
@@ -164,10 +162,6 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     if leaves[0][1].label and "surrogate" in content:
         content.attrs["title"] = f"Surrogates of the objective, {leaves[0][1].label}"
     run.write(content)
-
-
-def _label(model: Piecewise, family: str, leaf: Leaf) -> str:
-    return family if len(model.leaves) == 1 else f"{family} {model.leaves.index(leaf) + 1}"
 
 
 def _units(run: StudyRun) -> dict[str, str]:
