@@ -200,4 +200,5 @@ def test_the_sheet_of_a_real_infeasible_study_says_so(pages: dict[str, Path]) ->
     text = pages["infeasible"].read_text(encoding="utf-8")
     assert "No simulated design" in text
     assert ">nearest<" in text
+    assert "Recommended design" not in text
     assert write_sheet(pages["infeasible"].parent).read_bytes().count(b"/Type /Page ") == 1

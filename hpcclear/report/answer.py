@@ -67,7 +67,7 @@ def confidence(best: Results) -> str:
     """Return how well the numbers of a design are known, and what their intervals cover."""
     count = int(best["samples"]) if "samples" in best else 0
     level = float(best.attrs.get("confidence", np.nan))
-    text = f"{count} simulations of the recommended design"
+    text = f"{count} simulations of this design"
     text += " by randomised quasi-Monte Carlo" if best.attrs.get("method") == "qmc" else ""
     if weighted := int(best.get("rare_samples", 0)):
         more = f" and {weighted} weighted ones (importance sampling)"

@@ -4,6 +4,7 @@ import numpy as np
 
 from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best
+from hpcclear.report.alike import satisfies
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
 from hpcclear.results.content import Results, each, number_in, text_in, texts_in
@@ -16,6 +17,12 @@ def recommended(verified: Results) -> str:
     """Return the name of the recommended design; "" if no design was verified."""
     known = bool(np.isfinite(verified["mean_true"]).any())
     return str(best_of(ours_of(verified))["design"].item()) if known else ""
+
+
+def role(verified: Results) -> str:
+    """Return what the design of `recommended` is called: "nearest" where none is certain to satisfy the constraints."""
+    name = recommended(verified)
+    return "nearest" if name and not satisfies(verified.sel(design=name)) else "recommended"
 
 
 def goals_of(one: Results) -> list[str]:

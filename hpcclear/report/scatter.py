@@ -179,10 +179,10 @@ def _chaos(of: Recommended) -> Iterator[Line]:
     moved = of.files["chaos"]["chaotic"].values > SOME
     text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
-        text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
+        text += "; this one is not: perturbations of 1e-9, relative, leave its samples unchanged"
     else:
         changed, explained = (100 * float(own[name]) for name in ("chaotic", "chaos_share"))
-        text += f". Relative perturbations of 1e-9 change {changed:.0f} % of the recommended design's samples"
+        text += f". Relative perturbations of 1e-9 change {changed:.0f} % of this design's samples"
         text += f" and explain {explained:.0f} % of its variance"
     yield Line("chaos", text)
 

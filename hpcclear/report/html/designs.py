@@ -10,7 +10,7 @@ from hpcclear.report.constraints import worded
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, number
-from hpcclear.report.merit import counts, is_plain, recommended
+from hpcclear.report.merit import counts, is_plain, recommended, role
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results, each, text_in, texts_in
 
@@ -38,7 +38,7 @@ def roles(verified: Results) -> dict[str, dict[str, str]]:
             own = verified.sel(design=best)
             same = _same(verified, own, chosen)
             first = [] if same in chosen else [best.removeprefix(f"{case} ")]
-            chosen.setdefault(same, first).append("recommended")
+            chosen.setdefault(same, first).append(role(verified))
         if light := _lightest(verified, case, list(chosen)):
             chosen[light] = [light.removeprefix(f"{case} "), "lightest"]
         found[case] = {name: ", ".join(words) for name, words in chosen.items()}

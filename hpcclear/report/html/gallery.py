@@ -13,7 +13,7 @@ from hpcclear.report.figures import catalogue, designs, labels, motion, response
 from hpcclear.report.figures.theme import WIDTH
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
-from hpcclear.report.merit import recommended
+from hpcclear.report.merit import recommended, role
 from hpcclear.report.parts import FigureOf, declared
 from hpcclear.report.screen import upper
 from hpcclear.results.content import Results, texts_in
@@ -84,16 +84,16 @@ def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], F
                 caption = before + figure.captioned(one.files)
                 yield figure.name, figure.kind, caption, figure.of(one.files)
     verified = content.files.get("verification")
-    best = "" if verified is None else recommended(verified)
-    yield from _of_responses(content.responses, best)
+    best = ("", "") if verified is None else (recommended(verified), role(verified))
+    yield from _of_responses(content.responses, *best)
 
 
 def _of_responses(
-    found: Mapping[str, Results], best: str
+    found: Mapping[str, Results], best: str, called: str
 ) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
     if not found:
         return
-    titles = {"original": "original", best: "recommended"} if best in found else {}
+    titles = {"original": "original", best: called} if best in found else {}
     shown = {titles[name]: found[name] for name in titles if name in found} or found
     if len(shown) > 1:
         caption = f"Responses of the designs, two revolutions{_clearances(*shown.values())}."
@@ -104,7 +104,7 @@ def _of_responses(
         design, before = before or next(iter(found.values())), None
     caption = "The mechanism to scale, with its dimensions."
     if before is not None:
-        caption = "Recommended design: changed parts in orange, the baseline's outline dashed."
+        caption = f"{upper(called)} design: changed parts in orange, the baseline's outline dashed."
     draw = functools.partial(sketch.mechanism_figure, design, before)
     yield MECHANISM, "response", caption, draw
     name = "original" if "original" in found else next(iter(found))

@@ -9,7 +9,7 @@ from hpcclear.report import bearings
 from hpcclear.report.figures import labels, motion, noise
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, quantity
-from hpcclear.report.merit import recommended
+from hpcclear.report.merit import recommended, role
 from hpcclear.report.parts import SectionOf
 from hpcclear.report.screens.response import half_width
 from hpcclear.results.content import Results
@@ -19,7 +19,9 @@ def loads(content: Content) -> list[object] | None:
     """Return tables of the bearings of every stored response, torque, impacts, then remarks; None without any."""
     verified = content.files.get("verification")
     best = "" if verified is None else recommended(verified)
-    titles = {best: "recommended", "original": "baseline"}
+    titles = {"original": "baseline"}
+    if verified is not None:
+        titles[best] = role(verified)
     every = {titles.get(name, name): one for name, one in content.responses.items()}
     chosen = titles.values() if best else ()
     shown = {name: one for name, one in every.items() if name in chosen} or every

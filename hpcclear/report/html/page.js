@@ -5,7 +5,7 @@
   const content = JSON.parse(document.getElementById("content").textContent);
   const SVG = "http://www.w3.org/2000/svg";
   const byId = (id) => document.getElementById(id);
-  const called = (name) => name === "original" ? "baseline" : name === content.front.recommended ? `recommended (${name})` : name;
+  const called = (name) => name === "original" ? "baseline" : name === content.front.recommended ? `${content.front.role} (${name})` : name;
 
   function draw(parent, name, attributes = {}, text = null) {
     const element = document.createElementNS(SVG, name);

@@ -15,8 +15,9 @@ from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import PageTable, asset, render
+from hpcclear.report.merit import role
 from hpcclear.report.parts import SectionOf, declared
-from hpcclear.report.screen import WORRIES, Screen
+from hpcclear.report.screen import WORRIES, Screen, upper
 from hpcclear.report.screens import screen_of
 from hpcclear.report.sheet import sheet_of
 from hpcclear.results import files
@@ -176,7 +177,10 @@ def _missing(content: Content, troubles: list[str]) -> list[str]:
 def _further(content: Content) -> list[object] | None:
     """What else is known of the recommended design of a study, in lines."""
     rows = [[one.label, one.text] for one in answer(content.files)]
-    return [PageTable(["subject", "result"], rows, "Recommended design")] if rows else None
+    if not rows:
+        return None
+    title = f"{upper(role(content.files['verification']))} design"
+    return [PageTable(["subject", "result"], rows, title)]
 
 
-PARTS = (SectionOf(10, "designs", "answer", "Recommended design", _further),)
+PARTS = (SectionOf(10, "designs", "answer", "Criterion, constraints, confidence", _further),)

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.report.figures import labels, motion, moving, sketch
 from hpcclear.report.html.content import Content
-from hpcclear.report.merit import goals_of, leading_goals, recommended
+from hpcclear.report.merit import goals_of, leading_goals, recommended, role
 from hpcclear.report.screens.study import simulated
 from hpcclear.results.content import Results, text_in, texts_in
 
@@ -52,6 +52,7 @@ def front(content: Content) -> dict[str, Any]:
         "y": axes[1],
         **({"axes": axes} if len(axes) > 2 else {}),
         "recommended": recommended(verified),
+        "role": role(verified),
         "cases": sorted({point["case"] for point in points}),
         "points": points,
         "legend": {kind: text for kind, text in _LEGEND.items() if kind in kinds},
