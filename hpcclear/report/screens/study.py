@@ -1,7 +1,8 @@
 """The first screen of a study: the recommended design beside today's, its figures, and what to trust of them."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +61,8 @@ def screen(verified: Results, content: Content) -> Screen | None:
     today = None if kept else base
     tiles = list(_tiles(best, today, content))
     bars, causes = _bars(of)
-    infeasible = verdict_of(best) in _INFEASIBLE
+    if infeasible := verdict_of(best) in _INFEASIBLE:
+        tiles = [one._replace(good=None) for one in tiles]  # no gain without a design
     column = "nearest" if infeasible else "today, kept" if kept else "recommended"
     return Screen(
         _headline(best, tiles, kept),
@@ -84,7 +86,8 @@ def _headline(best: Results, tiles: list[Tile], kept: bool) -> str:
         return _INFEASIBLE[found]
     if kept:
         return "Keep today's design: no simulated design is better"
-    compared = [one for one in tiles if one.change][:2]  # limits have no former value
+    limits = [one.goal for one in constraints_of(best)]
+    compared = sorted((one for one in tiles if one.change), key=lambda one: one.label in limits)[:2]
     said = [f"{lower(one.change)} {one.label}" for one in compared if lower(one.change)]
     text = f"Recommended design: {', '.join(said) or 'no significant change'}"
     return labels.sentence(text, best)
@@ -105,6 +108,11 @@ def _doubt(of: Recommended) -> str:
 def _about(of: Recommended) -> Iterator[str]:
     """What was simulated."""
     yield f"f: {labels.objective(of.ours)}"
+    study = None if (scene := scene_of(of.best)) is None else scene.study
+    if study is not None:
+        yield from (f"over the load cases of {v.name}" for v in study.variables if v.over)
+        if len(study.cases) > 1:
+            yield f"case {text_in(of.best, 'case')} of {', '.join(one.name for one in study.cases)}"
     timing, designs = of.files.get("timing"), of.files["verification"].sizes["design"]
     if timing is not None and "samples" in timing:
         count = f"{int(timing['samples'].values.sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
@@ -125,29 +133,35 @@ def _statistics(best: Results) -> dict[str, str]:
 
 def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
     """Constraints and objectives of the case, then mean, standard deviation, percentile, and peak force; each once."""
-    limits, known = {one.label: one for one in _limits(best)}, _statistics(best)
+    limits, known = {one.label: one for one in _limits(best, base)}, _statistics(best)
     yield from (one for label, one in limits.items() if label not in known)
     for words in sorted(known, key=lambda one: one not in limits):
         stem = known[words]
         name = stem if stem in best else f"{stem}_true"
         unit, mine = answer.unit_of(best, name), labels.estimate(best, stem)
         before = None if base is None else labels.estimate(base, stem)
-        moved, good = ("", None) if before is None else change(mine, before)
-        shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
         if np.isfinite(mine[0]):
-            better = None if verdict_of(best) in _INFEASIBLE else good  # no gain without a design
             apart = limits[words].within if words in limits else within(*mine, unit)
-            yield Tile(words, shown, "".join(old), moved, apart, better)
+            yield _compared(words, unit, apart, mine, before)
     yield from _peaks(best, base, content)
 
 
-def _limits(best: Results) -> Iterator[Tile]:
+def _compared(
+    label: str, unit: str, apart: str, mine: Sequence[float], before: Sequence[float] | None = None
+) -> Tile:
+    """A value beside that of the baseline; both with the ends of their intervals."""
+    moved, good = ("", None) if before is None else change(mine, before)
+    shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
+    return Tile(label, shown, "".join(old), moved, apart, good)
+
+
+def _limits(best: Results, base: Results | None) -> Iterator[Tile]:
     """Constraints with their verdicts."""
-    for own in constraints_of(best):
-        interval = within(own.true, own.lower, own.upper, own.unit)
-        text = "; ".join(filter(None, (interval, own.bounded)))
-        shown, good = labels.quantity(own.true, own.unit), own.verdict is Verdict.HOLDS
-        yield Tile(own.goal, shown, within=text, good=good)
+    former = [] if base is None else constraints_of(base)
+    for own, old in zip_longest(constraints_of(best), former):
+        both = [(one.true, one.lower, one.upper) for one in (own, old) if one is not None]
+        text = "; ".join(filter(None, (within(*both[0], own.unit), own.bounded)))
+        yield _compared(own.goal, own.unit, text, *both)
 
 
 def simulated(one: Results) -> list[list[str]]:
