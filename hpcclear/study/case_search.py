@@ -100,9 +100,7 @@ class CaseSearch:
         count = min(self._batch, self._begun + self._most - len(self.designs))
         if self._idle == PATIENCE or count <= 0:
             return []
-        try:
-            beliefs = self._beliefs()
-        except InputError:  # too few designs that did not fail for a model
+        if (beliefs := self._beliefs()) is None:
             unit = unit_lhs(count, len(self._names), self._rng)
             return self.designs.add(self._region.at(unit))
         rows, left = self._leaders(beliefs), list[tuple[float, Array]]()
@@ -211,8 +209,12 @@ class CaseSearch:
 
     # -- what is known -------------------------------------------------------------------------------
 
-    def _beliefs(self) -> Beliefs:
-        self._last = Beliefs(self._known(), self._space, self._rng, self._last)
+    def _beliefs(self) -> Beliefs | None:
+        """By a model of all designs so far; None where too many of them failed for one."""
+        try:
+            self._last = Beliefs(self._known(), self._space, self._rng, self._last)
+        except InputError:
+            return None
         return self._last
 
     def _known(self) -> Known:
@@ -250,9 +252,7 @@ class CaseSearch:
     def settle(self) -> None:
         """Look closely at the best designs by the model, until it knows how far they keep their constraints."""
         for _ in range(SETTLED if any(not one.exact for one in self._case.kept) else 0):
-            try:
-                beliefs = self._beliefs()
-            except InputError:  # too few designs that did not fail for a model
+            if (beliefs := self._beliefs()) is None:
                 return
             point = improvement.expected(beliefs, self._space.directions[0])
             apart = self._space.apart(beliefs.known.designs, point)
@@ -282,9 +282,7 @@ class CaseSearch:
     def finalists(self) -> list[Choice]:
         """Designs to verify: in each direction the one that is believed to be the best, and others that may be; where there
         are constraints the best that keep them by several margins; and of the front as many as the study wants."""
-        try:
-            beliefs = self._beliefs()
-        except InputError:  # too few designs that did not fail for a model
+        if (beliefs := self._beliefs()) is None:
             return self.designs.choices[: self._run.study.verification.designs]
         known, main = beliefs.known.designs, self._space.directions[0]
         kept = np.flatnonzero(beliefs.allowed)
