@@ -19,9 +19,7 @@ def loads(content: Content) -> list[object] | None:
     """Return tables of the bearings of every stored response, torque, impacts, then remarks; None without any."""
     verified = content.files.get("verification")
     best = "" if verified is None else recommended(verified)
-    titles = {"original": "baseline"}
-    if verified is not None:
-        titles[best] = role(verified)
+    titles = {"original": "baseline"} | ({} if verified is None else {best: role(verified)})
     every = {titles.get(name, name): one for name, one in content.responses.items()}
     chosen = titles.values() if best else ()
     shown = {name: one for name, one in every.items() if name in chosen} or every
@@ -70,8 +68,11 @@ def _bearings(found: dict[str, list[bearings.Bearing]]) -> PageTable:
     pressed = bearings.pressures([one for _, one in every])
     header = ["response", "joint", "peak force", "at crank angle", "mean force"]
     header += ["contact", "mean gap", *(title for title, _ in pressed)]
-    further = [shown for _, shown in pressed]
-    rows = [[*_row(name, one), *(Number(shown(one)) for shown in further)] for name, one in every]
+    rows = []
+    for name, one in every:
+        cells = [quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N")]
+        cells += [Number(bearings.share(one.contact)), quantity(one.gap, "m")]
+        rows.append([name, one.joint, *cells, *(Number(shown(one)) for _, shown in pressed)])
     return _table(header, rows, "Bearings, over the averaged revolutions")
 
 
@@ -79,13 +80,6 @@ def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: 
     """A table of responses; a single response is not named."""
     first = 0 if len({row[0] for row in rows}) > 1 else 1
     return PageTable(header[first:], [row[first:] for row in rows], caption)
-
-
-def _row(name: str, one: bearings.Bearing) -> list[object]:
-    return [
-        name, one.joint, quantity(one.peak, "N"), Number(bearings.degrees(one)),
-        quantity(one.mean, "N"), Number(bearings.share(one.contact)), quantity(one.gap, "m"),
-    ]  # fmt: skip
 
 
 def _whole(name: str, found: Results) -> list[object]:

@@ -152,7 +152,7 @@ def _compared(
     """A value beside that of the baseline; both with the ends of their intervals."""
     moved, good = ("", None) if before is None else change(mine, before)
     shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
-    return Tile(label, shown, "".join(old), moved, apart, good)
+    return Tile(label, shown, "".join(old).strip("–"), moved, apart, good)
 
 
 def _limits(best: Results, base: Results | None) -> Iterator[Tile]:
@@ -178,9 +178,8 @@ def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Ti
     known = [one.get("peak_contact_force") for one in kept]
     forces = [np.nan if one is None else float(np.nanmax(one.values)) for one in known]
     if np.isfinite(forces[0]):
-        moved = change(*((force, np.nan, np.nan) for force in forces))
-        value, old = labels.quantities(forces, "N")
-        yield Tile("peak force", value, old.strip("–"), moved[0], "one run", moved[1])
+        both = ((force, np.nan, np.nan) for force in forces)
+        yield _compared("peak force", "N", "one run", *both)
 
 
 def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
