@@ -13,8 +13,8 @@ in Hz or 1/s it may be turns or radians, and is refused.
 import itertools
 import re
 import unicodedata
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
@@ -130,11 +130,9 @@ TEXTS: ContextVar[dict[tuple[float, str], str] | None] = ContextVar("texts", def
 _NOTED: ContextVar[Callable[[str, str], None] | None] = ContextVar("noted", default=None)
 
 
-@contextmanager
-def noting(take: Callable[[str, str], None]) -> Iterator[None]:
+def noting(take: Callable[[str, str], None]) -> AbstractContextManager[None]:
     """Within it, `take` gets each text that leaves its unit open, and a sentence that says how it is read."""
-    with holding(_NOTED, take):
-        yield
+    return holding(_NOTED, take)
 
 
 def note(text: str, read: str) -> None:

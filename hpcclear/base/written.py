@@ -2,8 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from math import isfinite
 from typing import NamedTuple
 
@@ -31,11 +30,9 @@ _SCALED = re.compile(r"[num\u00b5\u03bckMG]?(?:m|N|J|W|Pa|s|Hz)|k?g|rad")
 """Units that are shown in a size that is read well, whichever of them was written."""
 
 
-@contextmanager
-def reading(texts: Texts) -> Iterator[None]:
+def reading(texts: Texts) -> AbstractContextManager[None]:
     """Within it, texts of quantities that are read are kept in `texts`, and `shown` knows them."""
-    with holding(TEXTS, texts):
-        yield
+    return holding(TEXTS, texts)
 
 
 def text_of(value: float, target: str) -> str:

@@ -61,10 +61,7 @@ def _number(words: str, unit: str) -> float:
 def number_of(key: str, words: str, unit: str) -> float:
     """A plain number in SI, or one with a unit; raises InputError at `key` where it is neither."""
     with at(key, words):
-        value = _number(words, unit)
-    if not np.isfinite(value):
-        raise InputError(key, words, "is not a finite number", f"Write a number in {unit}")
-    return value
+        return Quantity(unit).number(_number(words, unit))
 
 
 def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]:

@@ -72,8 +72,11 @@ def _identified(
     turns = turns_of(plain.linkage)
     how, names = (frequency, turns, sense), settings.names
     tables = [[read_measured(path, n, units[n], *how) for n in names] for path in settings.signals]
-    layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
     size, ranks, sensor = settings.size(), session.ranks, settings.sensor
+    # refuses before anything is simulated
+    layouts = [
+        [Layout.of(one, sensor, _noise(one, settings.noise)) for one in row] for row in tables
+    ]
     kept, style = session.opened(), session.options.style
     ensemble = ensemble_of(plain, inputs, every, size, seed, ranks, kept, style)
     with ranks.stage("posterior"):
@@ -96,11 +99,6 @@ def _driven(scene: Scene, response: Results) -> tuple[float, int]:
 
 Found = Sequence[tuple[Prepared, Judgement]]
 """Of each record its models and what it says."""
-
-
-def _layouts(row: Sequence[Measured], settings: Settings) -> list[Layout]:
-    """The features that the signals of a record have."""
-    return [Layout.of(one, settings.sensor, _noise(one, settings.noise)) for one in row]
 
 
 def _verdict(

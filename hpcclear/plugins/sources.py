@@ -58,11 +58,9 @@ def note_package(package: str, version: str) -> None:
         here.packages[package] = version
 
 
-@contextlib.contextmanager
-def trusting(trust: bool = True) -> Iterator[None]:
+def trusting(trust: bool = True) -> contextlib.AbstractContextManager[None]:
     """In this block source text that a result file carries may be run."""
-    with holding(_trusted, trust):
-        yield
+    return holding(_trusted, trust)
 
 
 def is_trusting() -> bool:

@@ -50,7 +50,7 @@ def _outcome_fault(content: Results) -> str | None:
     for name in NUMBERS:
         judged = name not in JUDGED or "regime" in content  # 0 where nobody looked
         there = judged and name in content and name not in content.sizes
-        if there and _numbers(content[name].values[~finished]):
+        if there and not np.isnan(content[name].values[~finished]).all():
             return f"a failed simulation has a number in {name}"
     if "sample" in content:
         samples = content["sample"].values
@@ -59,8 +59,3 @@ def _outcome_fault(content: Results) -> str | None:
         if not all(np.isfinite(values).all() for values in designs_in(content).values()):
             return "a design is not finite"
     return None
-
-
-def _numbers(values: np.ndarray) -> bool:
-    """Whether something there is a number; integers always are."""
-    return bool(values.size) and not (values.dtype.kind == "f" and np.isnan(values).all())

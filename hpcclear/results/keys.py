@@ -11,9 +11,6 @@ from hpcclear.results.content import Results
 KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
 
-SHOWN = 40
-"""Characters of a value in a message, at most."""
-
 
 def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
     """The key of a run as a global attribute, for files that `check_key` is to recognise."""
@@ -48,9 +45,9 @@ def key_of(content: Results) -> dict[str, object]:
 def _apart(there: object, now: object) -> str:
     """Two values in words; of long ones the part from a little before the place where they begin to differ."""
     texts = ["nothing" if value is None else str(value) for value in (there, now)]
-    same = os.path.commonprefix(texts)  # noqa: RUF071 - texts, not places
-    if len(same) > SHOWN // 2:
-        first = max(same.rfind(", ") + 2, len(same) - SHOWN // 2)
+    most, same = 40, os.path.commonprefix(texts)  # noqa: RUF071 - texts, not places
+    if len(same) > most // 2:
+        first = max(same.rfind(", ") + 2, len(same) - most // 2)
         texts = [f"...{text[first:]}" for text in texts]
-    before, after = (text if len(text) <= SHOWN else f"{text[:SHOWN]}..." for text in texts)
+    before, after = (text if len(text) <= most else f"{text[:most]}..." for text in texts)
     return f"{before} there, {after} now"

@@ -44,10 +44,6 @@ def _quantity(field: FieldInfo) -> Quantity | None:
     return None
 
 
-def _named(field: FieldInfo) -> bool:
-    return any(isinstance(part, NamedRows) for part in field.metadata)
-
-
 _kinds: ContextVar[Mapping[str, str]] = ContextVar("kinds", default={})  # noqa: B039 - nobody writes into it
 _SEEN: dict[str, str] = {}
 """Kinds of rows that this process has read, by their paths: those of the scene read last."""
@@ -73,7 +69,8 @@ def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, FieldInfo, 
         kinds = () if kind is None else tuple(map(str, get_args(kind.annotation)))
         for name, field in model.model_fields.items():
             path = f"{prefix}.{name}"
-            inner = f"{path}.*" if _named(field) else path
+            named = any(isinstance(part, NamedRows) for part in field.metadata)
+            inner = f"{path}.*" if named else path
             yield from [*_entries(field.annotation, inner)] or [(path, field, kinds)]
 
 

@@ -114,7 +114,7 @@ class Beliefs:
         count, width = len(space.exact), known.excess.shape[1]
         none: list[Trended | None] = [None] * (count + width)
         found = list[Trended | None]()
-        trends = space.trends or [_nothing] * len(none)
+        trends = space.trends or [lambda points: np.zeros(len(points))] * len(none)
         for exact, values, errors, shifts, trend, last in zip(
             [*space.exact, *[None] * width], np.hstack([known.values, known.excess]).T,
             np.hstack([known.errors, known.excess_errors]).T, [*known.shifts, *[None] * width], trends,
@@ -180,11 +180,6 @@ class Beliefs:
         later = self.pending[self.feasible(self.pending) >= LIKELY]
         designs = np.vstack([self.known.designs[self.allowed], later])
         return designs, np.vstack([self.believed[self.allowed], self.means(later)])
-
-
-def _nothing(points: Array) -> Array:
-    """The trend where there is none."""
-    return np.zeros(len(points))
 
 
 class _Evaluated(NamedTuple):

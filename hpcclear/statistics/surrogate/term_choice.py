@@ -87,7 +87,8 @@ def _followed(
     terms = dict.fromkeys(map(tuple, known.tolist()))  # in their order
     counts = [len(known)]
     for product_of in _path(z[train], values[train], known, order, most - len(known)):
-        terms |= dict.fromkeys(_parts(product_of))
+        # each Legendre polynomial is even or odd
+        terms |= dict.fromkeys(product(*(range(degree, -1, -2) for degree in product_of)))
         counts.append(min(len(terms), most))
         if len(terms) >= most:
             break
@@ -144,8 +145,3 @@ def _legendre(z: Array, degrees: Integers) -> Array:
     for j in range(z.shape[1]):
         terms *= each[:, j, degrees[:, j]]
     return terms
-
-
-def _parts(degrees: Term) -> list[Term]:
-    """Monomials that make up a product of Legendre polynomials: each is even or odd."""
-    return list(product(*(range(degree, -1, -2) for degree in degrees)))
