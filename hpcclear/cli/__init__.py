@@ -8,7 +8,6 @@ import contextlib
 import importlib
 import io
 import os
-import pkgutil
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -79,7 +78,8 @@ class Program(click.Group):
 
 
 def _names() -> list[str]:
-    return sorted(one.name for one in pkgutil.iter_modules(commands.__path__))
+    names = os.listdir(commands.__path__[0])
+    return sorted(name[:-3] for name in names if name.endswith(".py") and name[0] != "_")
 
 
 def _load(name: str) -> Command:
