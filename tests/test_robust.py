@@ -81,9 +81,6 @@ def drawn(count, seed):
 CASES = pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1]])
 
 
-# Distributions
-
-
 @pytest.mark.parametrize("distribution", SCIPY, ids=str)
 def test_rule_integrates_polynomials(distribution):
     """N nodes are exact to degree 2 N - 1 (a normal's support is cut at 6 deviations)."""
@@ -119,9 +116,6 @@ def test_kernel_integral(distribution):
                 limit=200,
             )[0]
             assert value == pytest.approx(exact, rel=1e-8, abs=3e-9)
-
-
-# Standard errors
 
 
 def test_standard_errors_are_honest(shift):
@@ -237,9 +231,6 @@ def test_piecewise_model_is_averaged_over_draws():
     sampled = sample_moments(objective.sampled(places, drawn(300_000, 5)))
     assert (abs(found[:, 0] - sampled.mean) < 5 * sampled.mean_error).all()
     assert (abs(found[:, 1] - sampled.deviation) < 5 * sampled.deviation_error).all()
-
-
-# Refusals
 
 
 def test_support_must_stay_inside_the_domain():
