@@ -1,21 +1,22 @@
 """Simulations that a study's search takes, beside those of Bayesian optimisation, SMT and pymoo for the same regret.
 
-    python analysis/search_peers.py OUT            # ten studies, one after the other; writes results/search_peers.csv
+    python analysis/search_peers.py OUT            # 20 studies, one after the other; writes results/search_peers.csv
     python analysis/search_peers.py OUT --workers 2
 
-The studies are those of `analysis/fresh_studies.py` from seed 2060 on; bounded probabilities below `RAREST` are left out, since
-`DRAWS` plain draws a design do not see such failures. Each study is carried out once. Each peer runs with several seeds until
-the median of their regrets is at most the study's plus `EQUAL`, the resolution of the judge; the least of `BUDGETS` at which
-that is so counts. Of the package `reached` is the same: what its search takes with the least of `LIMITS` by which its regret is
-within `EQUAL` of that by default; `search` is what it takes until it ends by itself, which peers do not. Peers evaluate the
-same formula for `DRAWS` random draws of the inputs a design:
+The studies are those of `analysis/fresh_studies.py`, ten from seed 2060 and ten from 2117 on; bounded probabilities below
+`RAREST` are left out, since `DRAWS` plain draws a design do not see such failures. Each study is carried out once. Each peer
+runs with several seeds until the median of their regrets is at most the study's plus `EQUAL`, the resolution of the judge;
+what it has simulated by then counts (judged whenever it has simulated another batch, of one design mostly). Of the package
+`reached` is the same: what its search takes with the least of `LIMITS` by which its regret is within `EQUAL` of that by
+default; `search` is what it takes until it ends by itself, which peers do not. Peers evaluate the same formula for `DRAWS`
+random draws of the inputs a design:
 
 - bayes: scikit-learn's Gaussian processes (Matern 5/2 and white noise) of merit and constraints, expected improvement times the
   probability of keeping the constraints, in batches of one to a sixteenth of all designs; ends with the design that the models
   believe best among those that keep the constraints with a probability of `SURE`. The same draws for all designs, or
   (bayes_independent) others for each, which the white noise takes up.
-- smt: efficient global optimisation with noisy Kriging, constraints as a penalty; up to `SLOW` simulations, since it fits its
-  model anew for every design.
+- smt: efficient global optimisation with noisy Kriging, constraints as a penalty, one design at a time; up to `SLOW`
+  simulations, since it fits its model anew for every design.
 - pymoo: differential evolution with pymoo's constraints.
 
 A design that breaks its constraint by more than 2 % has no regret: it is broken; `above` counts designs that break it by more
@@ -31,6 +32,7 @@ import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +54,9 @@ from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 
 RESULTS = Path(__file__).parent / "results" / "search_peers.csv"
-FIRST, STUDIES, RAREST, LIMITS = 2060, 10, 1e-2, ((1, 1), (1, 3), (1, 6), (1, 12), (2, 12))
+FIRST, STUDIES, RAREST, LIMITS = (2060, 2117), 10, 1e-2, ((1, 1), (1, 3), (1, 6), (1, 12), (2, 12))
 DRAWS, SEEDS, SLOW = 64, (1, 2, 3), 3200
-BUDGETS = (565, 800, 1130, 1600, 2260, 3200, 4530, 6400, 9050, 12800, 25600, 51200)
+BUDGETS = (800, 1130, 1600, 2260, 3200, 4530, 6400, 9050, 12800, 25600, 51200)
 EQUAL, SURE, ABOVE = 5e-4, 0.9, 1e-3
 SEARCH = "kriging", "kriging check", "search"
 LOW, HIGH = np.array([PATHS[name][1:] for name in DESIGN]).T
@@ -170,6 +172,7 @@ def smt(simulate: Draws, seed: int) -> Iterator[tuple[int, np.ndarray]]:
     designs = qmc.LatinHypercube(3, rng=np.random.default_rng(seed)).random(12)
     size = float(np.ptp([simulate(one)[0] for one in designs]))
     values = penalised(designs)
+    yield len(designs), designs[values.argmin()]
     while len(designs) * DRAWS < SLOW:
         model = KRG(
             design_space=space,
@@ -179,9 +182,9 @@ def smt(simulate: Draws, seed: int) -> Iterator[tuple[int, np.ndarray]]:
             print_global=False,
             seed=seed,
         )
-        count = min(13 if len(designs) == 12 else 25, SLOW // DRAWS - len(designs))
+        own = seed + 100 * len(designs)  # other first points of the search for each design
         search = Search(
-            n_iter=count, criterion="EI", n_start=3, xdoe=designs, ydoe=values, surrogate=model, seed=seed
+            n_iter=1, criterion="EI", n_start=3, xdoe=designs, ydoe=values, surrogate=model, seed=own
         )  # fmt: skip
         best, _, _, designs, values = search.optimize(penalised)
         yield len(designs), np.ravel(best)
@@ -271,26 +274,24 @@ def compared(seed: int, out: Path, names: list[str]) -> list[dict[str, Any]]:
 
 
 def reached(peer: Any, draws: Any, regret: Any, own: float) -> dict[str, Any]:
-    """Median regret of a peer at each budget until it is as good as the study's, and how many of its designs are broken."""
+    """What a peer has simulated when its median regret is at most the study's, that median up to each of `BUDGETS`, and how
+    many of its last designs break a constraint."""
     method, common = peer
     runs = [method(draws(seed, common), seed) for seed in SEEDS]
-    budgets = [one for one in BUDGETS if one <= SLOW or method is not smt]
-    cells: dict[str, Any] = {"simulations": f"> {budgets[-1]}", "above": 0, "broken": 0}
-    last = [next(run) for run in runs]
-    for budget in budgets:
-        for k, run in enumerate(runs):
-            while last[k][0] * DRAWS < budget:
-                last[k] = next(run)
-        designs = [design for _, design in last]
-        found, broken = np.array(
-            [regret(LOW + np.clip(one, 0.0, 1.0) * (HIGH - LOW)) for one in designs]
-        ).T
-        cells["above"] += int((broken > ABOVE).sum())
-        cells["broken"] += int(np.isinf(found).sum())
+    most = SLOW if method is smt else BUDGETS[-1]
+    cells: dict[str, Any] = {"simulations": f"> {most}"}
+    for steps in zip(*runs, strict=True):
+        spent = steps[0][0] * DRAWS
+        if spent > most:
+            break
+        places = [LOW + np.clip(design, 0.0, 1.0) * (HIGH - LOW) for _, design in steps]
+        found, broken = np.array([regret(one) for one in places]).T
+        cells["above"], cells["broken"] = int((broken > ABOVE).sum()), int(np.isinf(found).sum())
         middle = float(np.median(found))
-        cells[str(budget)] = cells["regret"] = round(middle, 5) if np.isfinite(middle) else "broken"
+        column = next(str(budget) for budget in BUDGETS if budget >= spent)
+        cells[column] = cells["regret"] = round(middle, 5) if np.isfinite(middle) else "broken"
         if middle <= own + EQUAL:
-            return {**cells, "simulations": budget}
+            return {**cells, "simulations": spent}
     return cells
 
 
@@ -328,13 +329,12 @@ def main() -> None:
 
 def seeds() -> list[int]:
     """Seeds of the studies that are compared."""
-    found, seed = [], FIRST
-    while len(found) < STUDIES:
+
+    def taken(seed: int) -> bool:
         kept = study(seed)[0].required_study.cases[0].kept
-        if all(one.statistic != "exceedance" or one.most >= RAREST for one in kept):
-            found.append(seed)
-        seed += 1
-    return found
+        return all(one.statistic != "exceedance" or one.most >= RAREST for one in kept)
+
+    return [seed for one in FIRST for seed in islice(filter(taken, count(one)), STUDIES)]
 
 
 if __name__ == "__main__":
