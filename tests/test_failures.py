@@ -69,7 +69,7 @@ def test_samples_say_by_which_status_where_and_what_to_do():
     (text,) = explained(samples)
     assert text.startswith(f"{count} of 60 samples step_cap: {Status.STEP_CAP.message}; all at m2 ")
     assert "(range " in text
-    assert text.endswith(f"Remedy: {Status.STEP_CAP.remedy}")
+    assert text.endswith(f". {Status.STEP_CAP.remedy}")
 
 
 # -- corners ---------------------------------------------------------------------------------------------

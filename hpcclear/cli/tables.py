@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -23,23 +24,31 @@ class _PlainConsole(Console):
 def console() -> Console:
     """Standard output; at most 80 columns, colours only on a terminal."""
     clear()
+    return _PlainConsole(highlight=False, width=_room())
+
+
+def _room() -> int:
     screen = Console(highlight=False, soft_wrap=False)
-    width = min(WIDTH, screen.width) if screen.is_terminal else WIDTH
-    return _PlainConsole(highlight=False, width=width)
+    return min(WIDTH, screen.width) if screen.is_terminal else WIDTH
 
 
 def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> Table:
     """Columns below their headings, as wide as the terminal allows; without these two: what, and its value.
 
-    Where the columns are too narrow for their words, the rows stand beside each other if these are not.
+    Where the columns are too narrow for their words, the rows stand beside each other if these are not; where both are, an
+    interval may be broken.
     """
     made = Table(
         title=title or None, title_justify="left", box=box.SIMPLE_HEAD, show_header=bool(header), pad_edge=False
     )  # fmt: skip
     cells: Sequence[Sequence[str]] = [header or ("", ""), *rows]
-    widths = _widths(cells) if header else None
-    if header and widths is None and (widths := _widths(turned := [*zip(*cells, strict=True)])):
-        cells = turned
+    ways = (
+        [(one, tie) for tie in ("_±_", " ± ") for one in (cells, [*zip(*cells, strict=True)])]
+        if header
+        else []
+    )
+    fitting = ((one, widths) for one, tie in ways if (widths := _widths(one, tie)))
+    cells, widths = next(fitting, (cells, None))
     for k, head in enumerate(cells[0]):
         width = widths[k] if widths else None
         made.add_column(head, overflow="fold", no_wrap=not (header or k), width=width)
@@ -48,14 +57,15 @@ def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ())
     return made
 
 
-def _widths(cells: Sequence[Sequence[str]]) -> list[int] | None:
-    """Widths of columns that break no word or interval, the widest narrowed alike; None where these do not fit the terminal."""
-    columns = [[one.replace(" ± ", "_±_") for one in column] for column in zip(*cells, strict=True)]
+def _widths(cells: Sequence[Sequence[str]], tie: str) -> list[int] | None:
+    """Widths of columns that break no word, the widest narrowed alike; None where these do not fit the terminal. `tie`: what
+    stands for the sign of intervals."""
+    columns = [[one.replace(" ± ", tie) for one in column] for column in zip(*cells, strict=True)]
     natural, least = (
-        [max(len(part) for one in column for part in split(one) or [""]) for column in columns]
+        [max(cell_len(part) for one in column for part in split(one) or [""]) for column in columns]
         for split in (str.splitlines, str.split)
     )
-    room = WIDTH - 3 * len(columns) + 1  # between two columns stand three blanks, one at each end
+    room = _room() - 3 * len(columns) + 1  # between two columns stand three blanks, one at each end
     for most in range(max(natural), 0, -1):
         found = [max(word, min(whole, most)) for whole, word in zip(natural, least, strict=True)]
         if sum(found) <= room:

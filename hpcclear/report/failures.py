@@ -54,7 +54,7 @@ def sentences(
             continue
         place = where(failed, columns)
         count = f"{int(failed.sum())} of {failed.size} {what}"
-        yield f"{count} {code.name.lower()}: {code.message}{place and f'; {place}'}. Remedy: {code.remedy}"
+        yield f"{count} {code.name.lower()}: {code.message}{place and f'; {place}'}. {code.remedy}"
 
 
 def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:

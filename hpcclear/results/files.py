@@ -156,6 +156,8 @@ def probe(path: Path, mark: bytes = b"") -> None:
     refuse_foreign(path, mark)
     with _opened(path) as (directory, name):
         trial = _aside(name)
-        _write_whole(trial, b"", directory)
-        with contextlib.suppress(FileNotFoundError):  # a run that starts took it for a leftover
-            os.unlink(trial, dir_fd=directory)
+        try:
+            _write_whole(trial, b"", directory)
+        finally:
+            with contextlib.suppress(FileNotFoundError):  # a run that starts took it for a leftover
+                os.unlink(trial, dir_fd=directory)

@@ -206,7 +206,7 @@ class Quantity(Converted):
         lower, upper = self._together(value, key)
         if not lower < upper:
             reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
-            raise invalid(reason, "Write the smaller bound first; leave a constant out", key)
+            raise invalid(reason, "Write a smaller bound, then a larger one", key)
         if self.nonzero and lower < 0.0 < upper:
             raise invalid("0 is between the bounds", "Keep to one sign: nothing moves at 0", key)
         return lower, upper

@@ -43,7 +43,7 @@ def loads(content: Content) -> list[object] | None:
     for name, one in every.items():
         status = Status(int(one["status"]))
         if not status.valid:
-            parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
+            parts.append(f"{name}: failed, {status.message}. {status.remedy}.")
     return [*parts, *_remarks(shown)] or None
 
 

@@ -19,6 +19,7 @@ from hpcclear.report.html.content import Content, scene_of
 from hpcclear.report.merit import baseline_of, best_of, goals_of, is_plain, ours_of, usual_of
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
+    TILES,
     Screen,
     ScreenRow,
     ShareBar,
@@ -59,13 +60,14 @@ def screen(verified: Results, content: Content) -> Screen | None:
     of = Recommended(content.files, ours, best)
     kept = base is not None and text_in(base, "design") == text_in(best, "design")
     today = None if kept else base
-    tiles = list(_tiles(best, today, content))
+    aims = [] if is_plain(best) else [text_in(best, f"{name}_goal") for name in goals_of(best)]
+    tiles = sorted(_tiles(best, today, content), key=lambda one: one.label not in aims)
     bars, causes = _bars(of)
     if infeasible := verdict_of(best) in _INFEASIBLE:
         tiles = [one._replace(good=None) for one in tiles]  # no gain without a design
     column = "nearest" if infeasible else "today, kept" if kept else "recommended"
     return Screen(
-        _headline(best, tiles, kept),
+        _headline(best, tiles[:TILES], aims, kept),
         tuple(_about(of)),
         _doubt(of),
         tuple(tiles),
@@ -81,12 +83,12 @@ def screen(verified: Results, content: Content) -> Screen | None:
     )
 
 
-def _headline(best: Results, tiles: list[Tile], kept: bool) -> str:
+def _headline(best: Results, tiles: list[Tile], aims: list[str], kept: bool) -> str:
     if (found := verdict_of(best)) in _INFEASIBLE:
         return _INFEASIBLE[found]
     if kept:
         return "Keep today's design: no simulated design is better"
-    limits = [one.goal for one in constraints_of(best)]
+    limits = {one.goal for one in constraints_of(best)}.difference(aims)
     compared = sorted((one for one in tiles if one.change), key=lambda one: one.label in limits)[:2]
     said = [f"{lower(one.change)} {one.label}" for one in compared if lower(one.change)]
     text = f"Recommended design: {', '.join(said) or 'no significant change'}"
