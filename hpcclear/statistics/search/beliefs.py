@@ -114,7 +114,7 @@ class Beliefs:
         count, width = len(space.exact), known.excess.shape[1]
         none: list[Trended | None] = [None] * (count + width)
         found = list[Trended | None]()
-        trends = space.trends or [lambda points: np.zeros(len(points))] * len(none)
+        trends = space.trends or [_nothing] * len(none)
         for exact, values, errors, shifts, trend, last in zip(
             [*space.exact, *[None] * width], np.hstack([known.values, known.excess]).T,
             np.hstack([known.errors, known.excess_errors]).T, [*known.shifts, *[None] * width], trends,
@@ -182,6 +182,11 @@ class Beliefs:
         return designs, np.vstack([self.believed[self.allowed], self.means(later)])
 
 
+def _nothing(points: Array) -> Array:
+    """The trend where there is none."""
+    return np.zeros(len(points))
+
+
 class _Evaluated(NamedTuple):
     """One objective or constraint of n designs, as `Known` has them."""
 
@@ -194,25 +199,22 @@ class _Evaluated(NamedTuple):
 def _trended(
     made: _Evaluated, space: Space, trend: OfDesigns, rng: np.random.Generator, last: Trended | None
 ) -> Trended:
-    """A model with the trend or without it: the one with the smaller leave-one-out errors, by length scales of the `last`."""
+    """A model with the trend or without it: the one with the smaller leave-one-out errors."""
     guess, known = trend(made.designs), np.isfinite(made.values)
     steps = guess[known] - guess[known].mean() if known.any() else guess[known]
     squares = float(steps @ steps)
     moves = squares > FLAT**2 * float(np.square(guess[known]).sum())
     slopes = [0.0, float(steps @ made.values[known]) / squares] if moves else [0.0]
     like = last.rest if last else None
-
-    def model(slope: float, held: bool) -> Trended:
-        rest = made._replace(values=made.values - slope * guess)
-        return Trended(_fitted(rest, space.bounds, rng, like, held), slope, trend)
-
-    models = [model(slope, held=like is not None) for slope in slopes]
-    best = min(models, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
-    return best if like is None else model(best.slope, held=False)
+    models = [
+        Trended(_fitted(made._replace(values=made.values - slope * guess), space.bounds, rng, like), slope, trend)
+        for slope in slopes
+    ]  # fmt: skip
+    return min(models, key=lambda one: np.square(one.rest.values - one.rest.leave_one_out()).sum())
 
 
 def _fitted(
-    made: _Evaluated, bounds: Array, rng: np.random.Generator, like: Kriging | None, held: bool
+    made: _Evaluated, bounds: Array, rng: np.random.Generator, like: Kriging | None
 ) -> Kriging:
     designs, values = made.designs, made.values
     known = np.isfinite(values)
@@ -221,8 +223,8 @@ def _fitted(
         squares = np.where(made.errors > 0.0, made.errors, np.nan)[known] ** 2
     if not (size > 0.0 and np.isfinite(squares).any()):
         return fit_kriging(
-            designs, values, bounds, rng=rng, restarts=like is None, kernel=MATERN, like=like, held=held
-        )  # fmt: skip
+            designs, values, bounds, rng=rng, restarts=like is None, kernel=MATERN, like=like
+        )
     middle = float(np.nanmedian(squares))
     own = np.ones(len(values))
     own[known] = np.clip(np.nan_to_num(squares / middle, nan=1.0), 1e-3, 1e3)
@@ -231,7 +233,7 @@ def _fitted(
     low, high = (max(factor * middle / size**2, 1e-8) for factor in factors)
     return fit_kriging(
         designs, values, bounds, rng=rng, restarts=like is None, lengths=LENGTHS, kernel=MATERN,
-        noise=(low, max(high, 10.0 * low)), errors=Errors(own, common), like=like, held=held,
+        noise=(low, max(high, 10.0 * low)), errors=Errors(own, common), like=like,
     )  # fmt: skip
 
 

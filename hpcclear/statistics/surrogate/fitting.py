@@ -59,7 +59,6 @@ def fit_kriging(
     noise: tuple[float, float] | None = None,
     errors: Errors | None = None,
     like: Kriging | None = None,
-    held: bool = False,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -68,8 +67,7 @@ def fit_kriging(
     `restarts` starting points besides the first, drawn by `rng`, with length scales (in the unit cube) between `lengths`, and
     the noise variance, in units of the variance of the values, between those of `noise`. `errors`: what is known of those of
     the values; else they are all alike. `like`: a model of nearly the same values, whose length scales and variances are the
-    first starting point, or (`held`) kept. Raises InputError: points outside the bounds, or fewer valid samples than parameters
-    to fit (d + 3).
+    first starting point. Raises InputError: points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     needed = points.shape[-1] + 3  # length scales, signal, noise, mean
@@ -92,7 +90,7 @@ def fit_kriging(
     seed = int(rng.integers(2**31))
     with one_thread():
         found = maximise(
-            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, errors=known, held=held,
+            unit, (outcomes - mean) / scale, starts, box, restarts, seed, kernel=kernel, errors=known,
         )  # fmt: skip
     return Kriging(
         labels, lower, upper, **vars(found), mean=mean, scale=scale, inputs=inputs, values=values[valid],

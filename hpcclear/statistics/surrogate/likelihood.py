@@ -64,14 +64,12 @@ def maximise(
     *,
     kernel: Kernel = SQUARED_EXPONENTIAL,
     errors: Errors | None = None,
-    held: bool = False,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values (n,) of mean 0 at points (n, d) in the unit
     cube.
 
     The search begins from those that are `known`, (d + 2,) each in this order, and from further `restarts` by the seed, within
-    `bounds` (d + 2, 2). `errors`: what is known of those of the values; else they are all alike. `held`: the first known one
-    is taken.
+    `bounds` (d + 2, 2). `errors`: what is known of those of the values; else they are all alike.
     """
     tolerance = FLAT if errors else None
     errors = errors or Errors(np.ones(len(values)))
@@ -80,9 +78,7 @@ def maximise(
     starts = [np.log(one) for one in known]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
-    if held:
-        top = starts[0]
-    elif len(parts) == 1:
+    if len(parts) == 1:
         top = _climbed(starts, limits, tolerance, centred, values, kernel, errors)
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
