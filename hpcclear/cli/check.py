@@ -13,7 +13,6 @@ from hpcclear.cli.terminal import print_remark, show_rows
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
-from hpcclear.scene.cases import Goal
 from hpcclear.scene.plugged import files_run
 from hpcclear.scene.study_tables import DRAWN
 from hpcclear.scene.variables import StudyVariable
@@ -167,17 +166,12 @@ def _study_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     yield "samples", f"{study.samples} ({DRAWN[study.method]}), seed {study.seed}"
     yield "objective", f"{study.objective}: {scene.objective.words}"
     unit = scene.objective.unit
-
-    def words(one: Goal) -> str:
-        what, above, limit = one.words(unit).partition(" above ")
-        own = "" if one.limit is None else scene.in_unit(one.limit, limit.partition(" ")[2])
-        return f"{what}{above}{own or limit}"
-
     for case in study.cases:
         parts = [f"random {', '.join(case.random)}"]
-        parts.append(f"lowest {', '.join(map(words, case.goals))}")
-        bounds = ((words(one), scene.in_unit(one.most, one.unit(unit))) for one in case.kept)
-        parts += (f"{what} at most {most}" for what, most in bounds)
+        parts.append(f"lowest {', '.join(one.words(unit, scene.in_unit) for one in case.goals)}")
+        for one in case.kept:
+            most = scene.in_unit(one.most, one.unit(unit))
+            parts.append(f"{one.words(unit, scene.in_unit)} at most {most}")
         yield f"case {case.name}", "; ".join(parts)
     if not detailed():
         short = {"variables": study.variables, "random": (*study.random, *study.worn)}

@@ -1,6 +1,6 @@
 """Cases of a study: what is random in an optimisation, which statistics are minimised, and what designs must keep to."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Literal, get_args
 
 import numpy as np
@@ -106,15 +106,16 @@ class Goal(Table):
         same = (self.statistic, self.limit, self.of) == (other.statistic, other.limit, other.of)
         return same and self.formula == other.formula and self.order == other.order
 
-    def words(self, unit: str) -> str:
-        """What it is, for people: "95th percentile of f", "probability of f above 0.3 mm" by the `unit` of f."""
+    def words(self, unit: str, shown: Callable[[float, str], str] = "{:g} {}".format) -> str:
+        """What it is, for people: "95th percentile of f", "probability of f above 0.3 mm" by the `unit` of f; `shown`: how a
+        limit in a unit is written."""
         if self.formula is not None:
             return self.formula
         what, unit = self._response(unit)
         if self.statistic == "quantile":
             return f"{100 * self.order:g}th percentile of {what}"
         if self.statistic == "exceedance":
-            return f"probability of {what} above {self.limit:g} {unit}"
+            return f"probability of {what} above {shown(self.limit or 0.0, unit)}"
         if self.statistic == "deviation":
             return f"standard deviation of {what}"
         return "cost" if self.statistic == "cost" else f"{self.statistic} of {what}"
