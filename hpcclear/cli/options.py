@@ -112,13 +112,11 @@ class Written(NamedTuple):
     overrides: tuple[str, ...]
 
 
-def loaded(written: Written) -> "Scene":
-    """The scene; Python files that it runs, readings of units and likely slips of units are printed."""
-    from hpcclear.scene import load_scene
+def noted(scene: "Scene") -> "Scene":
+    """Return the scene, after printing the Python files that it runs, readings of units and likely slips of units."""
     from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
 
-    scene = load_scene(*written)
     for text in (*files_run(scene.plugins), *map(str, scene.readings)):
         say(f"Note: {text}")
     for text in implausible(scene):

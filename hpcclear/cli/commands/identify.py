@@ -58,7 +58,9 @@ def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> in
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        from hpcclear.scene import load_scene
+
+        scene = cli.noted(load_scene(*written))
         from hpcclear.cli.printing import describe_run
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings

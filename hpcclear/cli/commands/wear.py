@@ -21,7 +21,9 @@ def run(written: cli.Written, output: Path, how: cli.How) -> int:
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        from hpcclear.scene import load_scene
+
+        scene = cli.noted(load_scene(*written))
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.wear import run_wear
         from hpcclear.report.screens.lives import followed
