@@ -26,18 +26,22 @@ if TYPE_CHECKING:
     from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 
 
-def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
+def axis(scene: Scene, words: str, option: str = "--x") -> tuple[str, tuple[str, ...], np.ndarray]:
     """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; bounds in SI or with a unit.
 
-    Raises InputError if the words do not say that.
+    Raises InputError at the option if the words do not say that.
     """
     found = re.fullmatch(r"([^=]+)=([^:]+):([^:]+):\s*(0*[1-9]\d{0,8})\s*", words)
     if found is None:
         example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
-        raise InputError("map", words, "is not PATH=LO:HI:N", example)
+        raise InputError(option, words, "is not PATH=LO:HI:N", example)
     name, *ends, count = found.groups()
     paths = paths_of(scene, name)
-    return name, paths, np.linspace(*range_of("map", words, ends, scene.unit(paths[0])), int(count))
+    return (
+        name,
+        paths,
+        np.linspace(*range_of(option, words, ends, scene.unit(paths[0])), int(count)),
+    )
 
 
 def range_of(key: str, words: str, ends: Sequence[str], unit: str) -> tuple[float, float]:
@@ -69,11 +73,11 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
 
     Raises InputError if an axis is not one, two are the same, or a cell makes no mechanism.
     """
-    parsed = [axis(scene, words) for words in axes]
+    parsed = [axis(scene, *one) for one in zip(axes, ("--x", "--y"), strict=False)]
     names = tuple(name for name, _, _ in parsed)
     driven = [entry for _, paths, _ in parsed for entry in paths]
     if len(set(driven)) < len(driven):
-        raise InputError("map", " ".join(axes), "two axes drive the same entry", "Drop one")
+        raise InputError("--y", axes[1], "two axes drive the same entry", "Drop one")
     grid = np.meshgrid(*(values for _, _, values in parsed), indexing="ij")
     values = np.column_stack([one.ravel() for one in grid])
     points = Points(names, values, tuple(paths for _, paths, _ in parsed))
