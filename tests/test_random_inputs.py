@@ -186,7 +186,7 @@ def test_distributions_may_lie_about_the_design() -> None:
         ("a,b\n1,2\n", None, "study.random.C.column", "2 columns"),
         ("a,b\n1,2\n", "c", "study.random.C.column", "no column"),
         ("C [mm]\n0.3\nthick\n", None, "line 3, column C", "not a finite decimal"),
-        ("C [mm], D\n0.3\n", "D", "line 2", "1 cells"),
+        ("C [mm], D\n0.3\n", "D", "line 2", "1 cell"),
         ("C [kg]\n0.3\n0.4\n", None, "study.random.C.values", "does not fit"),
         ("C [mm]\n0.3\n", None, "study.random.C.values", "from 2 to"),
         ("C [mm]\n0.3\n-0.4\n", None, "study.random.C.values", "above 0"),

@@ -13,3 +13,8 @@ def plain(text: str) -> str:
         return text
     commands = {one for one in set(text) - {*_KEPT} if unicodedata.category(one) in _CATEGORIES}
     return text.translate({ord(o): o.encode("unicode_escape").decode() for o in commands})
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words: "1 row", "2 rows"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

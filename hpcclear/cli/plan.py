@@ -6,9 +6,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from hpcclear.accuracy.plan import Plan, Row
+from hpcclear.base.plain import counted
 from hpcclear.cli.options import detailed
 from hpcclear.cli.tables import console, table
-from hpcclear.cli.terminal import counted, show_rows
+from hpcclear.cli.terminal import show_rows
 from hpcclear.ranks.progress import duration
 from hpcclear.ranks.terminal import WIDTH
 
@@ -28,7 +29,7 @@ def preview(plan: Plan) -> str:
     doubts += ["probably less"] if plan.first else []
     wall = duration(plan.wall_seconds(row, plan.simulations, plan.workers))
     text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {plan.simulations} simulations take"
-    text = f"{text} {wall} on {counted(plan.workers)}"
+    text = f"{text} {wall} on {counted(plan.workers, 'rank')}"
     return f"{text} ({'; '.join(doubts)})" if doubts else text
 
 
@@ -49,7 +50,7 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
         hours = f"{plan.core_seconds(one, *job) / 3600:.2g}"
         wall = duration(plan.wall_seconds(one, *job))
         rows.append((reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall))
-    title = f"{command}: {plan.simulations} simulations on {counted(plan.workers)}"
+    title = f"{command}: {plan.simulations} simulations on {counted(plan.workers, 'rank')}"
     header = ("error of f", "settings", "ms/sample", "core-h", "wall time")
     out.print(table(title, rows, header))
     show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == ON_SCREEN])

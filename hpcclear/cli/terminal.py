@@ -37,8 +37,3 @@ def fitting(text: str) -> str:
     if "utf" in (sys.stdout.encoding or "").lower():
         return text
     return text.replace("µ", "u").replace("²", "^2").replace("–", "-").replace("±", "+-")
-
-
-def counted(ranks: int) -> str:
-    """A number of ranks in words."""
-    return f"{ranks} rank{'' if ranks == 1 else 's'}"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError, content_of
+from hpcclear.base.plain import counted
 from hpcclear.base.units import is_unit, may_be_thousands
 from hpcclear.scene import clock
 
@@ -293,12 +294,12 @@ def _row(
     """Cells of a row, as many as headings; the columns of a table are as many as `width`."""
     if len(found) == len(header):
         return found
-    count, cells = len(found), found[:width]
-    reason, remedy = f"has {count} cells instead of {len(header)}", "Give each column a value"
+    cells, remedy = found[:width], "Give each column a value"
+    reason = f"has {counted(len(found), 'cell')} instead of {len(header)}"
     few = len(cells) < len(header) and len(header) > 1 and separator in (",", "")
     many = any(found[width:]) or len(cells) > len(header)
     if many and not few and separator == ",":
-        if count == 2 * len(header):
+        if len(found) == 2 * len(header):
             reason += ": commas seem to stand between cells and in decimals"
         remedy = "Where decimals have commas, save it with semicolons between cells"
     if few or many:

@@ -11,6 +11,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
+from hpcclear.base.plain import counted
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
@@ -98,7 +99,8 @@ def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
     kind = _kind(curve, unit, key)
     first, angles = _column(sheet, "angle", curve.angle, "rad", key)
     second, values = _column(sheet, kind, getattr(curve, kind), _VALUES[kind], key, (first,))
-    shown = f"{sheet.found}, {len(angles)} rows, {second.name} from {_span(values, second)}"
+    rows = counted(len(angles), "row")
+    shown = f"{sheet.found}, {rows}, {second.name} from {_span(values, second)}"
     if kind == "pressure":
         values = _forces(curve, second, values, unit, key)
     if curve.clockwise:
@@ -120,7 +122,7 @@ def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
     start = times[0] if kind in _MOTIONS else 0.0
     made = np.column_stack([times - start, values]).tolist()
     since = f", {first.heading} since {first.cells[0]}" if sheet.is_clock(first) else ""
-    return made, f"{sheet.found}, {len(times)} rows{since}"
+    return made, f"{sheet.found}, {counted(len(times), 'row')}{since}"
 
 
 def _kind(curve: FileCurve, unit: str, key: str) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.plain import counted
 from hpcclear.cli import options as cli
 
 
@@ -56,4 +57,5 @@ def run(
             more = f" and {len(left) - 3} more" if len(left) > 3 else ""
             named = f"{', '.join(left[:3])}{more}"
             cli.say(f"Note: left out, with too many columns for a table: {named} (in {files[0]})")
-    cli.show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
+    rows, columns = counted(len(table), "row"), counted(len(table.columns), "column")
+    cli.show(f"written  {output}: {rows}, {columns}")

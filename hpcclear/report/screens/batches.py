@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.base.plain import counted
 from hpcclear.report import bearings, failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
@@ -55,7 +56,7 @@ def samples(found: Results, content: Content) -> Screen:
     share = _share(found, Flag.BEYOND_HERTZ)
     return Screen(
         labels.sentence(headline, found),
-        (f"f: {labels.objective(found)}", f"{len(f)} simulation{'s' * (len(f) > 1)}", varied),
+        (f"f: {labels.objective(found)}", counted(len(f), "simulation"), varied),
         "the contact model is outside its range" if share > MOST else "",
         tiles,
         ("statistic", "value", "95 % CI") if rows else (),
@@ -103,7 +104,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
     """Return the first screen of a map."""
     good = found["status"].values == Status.OK
     regimes = found["regime"].values
-    cells, count = len(good), int(good.sum())
+    cells, count = counted(len(good), "cell"), int(good.sum())
     kinds = [(regime, int(((regimes == regime) & good).sum())) for regime in Regime]
     kinds = sorted((one for one in kinds if one[1]), key=lambda one: -one[1])
     growth = found["lyapunov_exponent"].values[good]
@@ -113,7 +114,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
     headline = "Every cell failed"
     if kinds:
         (most, _, why), *rest = (regime.meaning.partition(":") for regime, _ in kinds[:2])
-        headline = f"{most.capitalize()} at {kinds[0][1]} of {cells} cells{why and ':'}{why}"
+        headline = f"{most.capitalize()} at {kinds[0][1]} of {cells}{why and ':'}{why}"
         headline += "".join(f"; {kind} at {kinds[1][1]}" for kind, *_ in rest)
     tiles: tuple[Tile, ...] = ()
     if len(growth):
@@ -123,11 +124,11 @@ def map_of_motion(found: Results, content: Content) -> Screen:
             Tile("range of f", labels.between(float(f.min()), float(f.max()), unit)),
         )
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    level = green if count == cells else amber
-    trust = [level(f"{count} of {cells} cells without failure", "quality")]
+    level = green if count == len(good) else amber
+    trust = [level(f"{count} of {cells} without failure", "quality")]
     moving = (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
     if open_ := sum(n for regime, n in kinds if regime in moving):
-        text = f"{open_} cells have not settled: longer transients would decide"
+        text = f"{counted(open_, 'cell')} not settled: longer transients would decide"
         trust.append(amber(text, "quality"))
     if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
         level = red if share > MOST else amber
@@ -135,7 +136,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
         trust.append(level(f"{spread.percent(share)} of the cells: {text}", "quality"))
     rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
     return Screen(
-        headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
+        headline, (f"{cells} over {axes}", f"f: {labels.objective(found)}"),
         "the contact model is outside its range" if share > MOST else "",
         tiles, ("motion", "cells") if rows else (), rows, trust=trusted(trust, share > MOST),
         figures=("map",),
