@@ -4,13 +4,12 @@ Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goe
 known to the target error.
 """
 
-import contextlib
 import importlib
 import io
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import click
 
@@ -49,8 +48,7 @@ class Program(click.Group):
     def every(self) -> dict[str, Command]:
         """All commands by name, in the order of their groups."""
         found = {name: _load(name) for name in _names()}
-        order = list(GROUPS)
-        return dict(sorted(found.items(), key=lambda item: order.index(item[1].group)))
+        return dict(sorted(found.items(), key=lambda one: [*GROUPS].index(one[1].group)))
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands, in the order of their groups."""
@@ -122,28 +120,17 @@ def _refused(error: click.ClickException) -> int:
     return Exit.BAD_INPUT
 
 
-def _show_warning(message: Warning | str, *_: object) -> None:
-    """Print a library's warning as one line: it may quote a file."""
-    say(f"Warning: {message}")
-
-
-@contextlib.contextmanager
-def _numbers_in_silence() -> Iterator[None]:
-    """Without NumPy's warnings of divisions and overflows: a number that cannot be had is NaN, and a status says why."""
-    with warnings.catch_warnings():
-        if not sys.warnoptions:
-            warnings.simplefilter("ignore", RuntimeWarning)
-        yield
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
     listen(say)
-    warnings.showwarning = _show_warning  # type: ignore[assignment]
+    # one line, which may quote a file
+    warnings.showwarning = lambda message, *_: say(f"Warning: {message}")  # type: ignore[assignment]
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     # no plug-ins for pydantic, for which it looks through all that is installed
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "true")
-    with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
+    with StopSwitch(ends_process=True) as stop, warnings.catch_warnings():
+        if not sys.warnoptions:  # of divisions and overflows: a status says why a number is NaN
+            warnings.simplefilter("ignore", RuntimeWarning)
         try:
             check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)

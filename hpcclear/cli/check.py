@@ -248,8 +248,7 @@ def _cost_rows(scene: Scene) -> Iterator[tuple[str, str]]:
         whole, each = expected(scene, evaluated, each)
     yield "hpcclear sample", _all(scene.study.samples, each)
     if whole:
-        text = f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan"
-        yield "hpcclear run", text
+        yield "hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan"
 
 
 def _all(count: int, each: float) -> str:

@@ -45,11 +45,6 @@ def output_option(words: str, required: bool = True) -> Callable[[FC], FC]:
     return option("-o --output", words, type=PATH, required=required, callback=_netcdf_name)
 
 
-def directory_option(words: str) -> Callable[[FC], FC]:
-    """The option that names the directory that results go to."""
-    return option("-o --output", words, type=PATH, required=True)
-
-
 def option(usage: str, words: str, shown: object = None, **more: Any) -> Callable[[FC], FC]:
     """An option as its usage has it, such as "--size LENGTH"; repeatable where its words say so.
 
@@ -95,9 +90,6 @@ INTERVAL = option(
     "--checkpoint-interval SECONDS", "Save finished samples this often; a crash loses about this much simulation time.",
     5.0, type=Amount(min=0.0), name="interval",
 )  # fmt: skip
-POINTS = option(
-    "--points", "CSV table of designs, used instead of the designs of the study.", type=PATH
-)
 _STYLES = click.Choice(["auto", "bar", "log", "quiet"])
 PROGRESS = option("--progress", "Display of progress.", "auto", type=_STYLES)
 
@@ -165,23 +157,21 @@ class Command(click.Command):
         return left
 
 
-DETAILED = f"{__name__}.details"
-"""Key of the context's `meta`: whether ``--details`` was given."""
+DETAILS = option(
+    "--details", "Print all results, not the first screen only.", is_flag=True, expose_value=False
+)
 
 
-def _note(context: click.Context, option: click.Parameter, given: bool) -> None:
-    context.meta[DETAILED] = given
+def is_given(name: str) -> bool:
+    """Whether the words of a command give a parameter; of no command none is."""
+    context = click.get_current_context(silent=True)
+    source = None if context is None else context.get_parameter_source(name)
+    return source is ParameterSource.COMMANDLINE
 
 
 def detailed() -> bool:
     """Whether all results are requested; not outside of a command."""
-    context = click.get_current_context(silent=True)
-    return context is not None and bool(context.meta.get(DETAILED))
-
-
-DETAILS = option(
-    "--details", "Print all results, not the first screen only.", is_flag=True, expose_value=False, callback=_note
-)  # fmt: skip
+    return is_given("details")
 
 
 Run = Callable[..., int | None]
@@ -225,8 +215,8 @@ def check_mode(
     """
     context = click.get_current_context()
     for option in context.command.params:
-        given = context.get_parameter_source(option.name or "") is ParameterSource.COMMANDLINE
-        if given and option.name in (others if chosen else its_own):
+        unused = option.name in (others if chosen else its_own)
+        if unused and is_given(option.name or ""):
             word = max(option.opts, key=len)
             why = f"{word} cannot be combined with {mode}" if chosen else f"{word} needs {mode}"
             raise click.UsageError(f"{why}.", context)

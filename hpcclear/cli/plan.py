@@ -68,8 +68,7 @@ def _needs(plan: Plan, row: Row) -> Iterator[tuple[str, str]]:
     yield "core-seconds", f"{plan.core_seconds(row, count, ranks):.3g}"
     yield "wall time", duration(plan.wall_seconds(row, count, ranks))
     yield "start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"
-    memory = f"{plan.memory / 2**20:.0f} MB per rank, {count * 1e-6:.2g} GB more on rank 0"
-    yield "memory", memory
+    yield "memory", f"{plan.memory / 2**20:.0f} MB per rank, {count * 1e-6:.2g} GB more on rank 0"
     yield "disk", f"{plan.disk(count) / 2**20:.3g} MB"
     if row.reached:
         yield "reached", row.reached

@@ -216,9 +216,8 @@ def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
     if (scene := scene_of(response)) is None:
         return {}
-    pins = {joint: scene.pin(joint) for joint in scene.pins()}
     return {
         joint: 2.0 * one.bearing_radius * float(attrgetter(one.length_path)(one))
-        for joint, one in pins.items()
-        if one.length_path is not None
+        for joint in scene.pins()
+        if (one := scene.pin(joint)).length_path is not None
     }

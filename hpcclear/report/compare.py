@@ -178,8 +178,7 @@ def _aligned(
         return _best(at, simulated, measured, steps), "by crank angle"
     if how == "correlation":
         shifts = np.linspace(0, span, SHIFTS * turns, endpoint=False)
-        found = _best(at, simulated, measured, shifts, refine=True)
-        return found, "by the largest correlation"
+        return _best(at, simulated, measured, shifts, refine=True), "by the largest correlation"
     return 0.0, NOT_ALIGNED
 
 

@@ -36,8 +36,7 @@ class JudgedConstraint(NamedTuple):
         """What would decide it, in words; "" where that is not known."""
         if np.isinf(self.price):
             return OPEN
-        known = np.isfinite(self.price)
-        return f"about {self.price:.0f} simulations would decide" if known else ""
+        return "" if np.isnan(self.price) else f"about {self.price:.0f} simulations would decide"
 
     @property
     def bounded(self) -> str:

@@ -75,8 +75,7 @@ def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
         low, high = (float(end(one.values[failed])) for end in (np.min, np.max))
         inside &= (one.values >= low) & (one.values <= high)
         whole = labels.between(float(one.values.min()), float(one.values.max()), one.unit)
-        ends = labels.between(low, high, one.unit)
-        ranges.append(f"{one.name} {ends} (range {whole})")
+        ranges.append(f"{one.name} {labels.between(low, high, one.unit)} (range {whole})")
     return f"all at {', '.join(ranges)}, where {int(failed.sum())} of {int(inside.sum())} failed"
 
 

@@ -125,8 +125,7 @@ def _advice(content: Results) -> Iterator[Line]:
         parts = []
         for u, unknown in enumerate(content["unknown"].values):
             unit = str(content["unit"].values[u])
-            widths = content["expected_half_width"].values[k, :, u]
-            pairs = zip(widths, counts, strict=True)
+            pairs = zip(content["expected_half_width"].values[k, :, u], counts, strict=True)
             shown = (f"{rounded(float(width), unit)} ({count})" for width, count in pairs)
             parts.append(f"{short(unknown)} ± {', '.join(shown)}")
         if len(parts) > 1:

@@ -70,8 +70,7 @@ def counts(one: Results) -> bool:
 
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
-    every = each(ours, "design")
-    return next(filter(labels.is_baseline, every), None)
+    return next(filter(labels.is_baseline, each(ours, "design")), None)
 
 
 def best_of(ours: Results) -> Results:

@@ -172,8 +172,7 @@ def side_by_side(
     found = {}
     for name, samples in every.items():
         units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}
-        joints = texts_in(samples, "joint")
-        levels = [beyond(units, words, joints) for words in thresholds]
+        levels = [beyond(units, words, texts_in(samples, "joint")) for words in thresholds]
         count = samples.sizes["sample"]
         lines = [Line("samples", str(count), StatedValue(count)), *statistics(samples, levels)]
         found[name] = {line.label: line for line in lines}

@@ -121,8 +121,7 @@ class _Table:
                 continue
             # of every row, repeated along dimensions that the variable lacks
             sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
-            whole = np.broadcast_to(one.values.reshape(sizes), self.shape)
-            self.columns[heading] = whole.ravel()
+            self.columns[heading] = np.broadcast_to(one.values.reshape(sizes), self.shape).ravel()
             self.keys |= {heading} if name in self.rows else set()
 
 
@@ -210,5 +209,4 @@ def _words(variable: Variable) -> np.ndarray:
 
 def identifier(heading: str) -> str:
     """A heading as a name of MATLAB: letters, digits and underscores, at most 63; its unit is left out."""
-    name = re.sub(r"\W+", "_", heading.partition(" [")[0])
-    return name.strip("_")[:63]
+    return re.sub(r"\W+", "_", heading.partition(" [")[0]).strip("_")[:63]

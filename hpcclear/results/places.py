@@ -56,8 +56,7 @@ class Place:
         files.probe(output, netcdf.SEAL)
         parent, timing = output.parent, output.with_name(f"{output.stem}.timing.nc")
         files.refuse_foreign(timing, netcdf.SEAL)
-        lock = parent / f".{output.name}.lock"
-        return cls(output, _parts_of(output), timing, lock, (parent,))
+        return cls(output, _parts_of(output), timing, parent / f".{output.name}.lock", (parent,))
 
     @classmethod
     def of_response(cls, output: Path) -> Self:

@@ -109,9 +109,8 @@ class ResultKind:
     @cached_property
     def required(self) -> set[str]:
         """Data variables that every file has."""
-        asked = {*ON_REQUEST, *JUDGED, "label"}
         if self.whole:
-            return self.data.keys() - asked
+            return self.data.keys() - {*ON_REQUEST, *JUDGED, "label"}
         return {name for name, row in self.data.items() if row.required}
 
 

@@ -11,7 +11,9 @@ from hpcclear.cli import options as cli
 
 @cli.command("keep", "Write results as a table for Excel, MATLAB or pandas.")
 @click.argument("files", type=cli.PATH, nargs=-1, required=True, metavar="FILE...")
-@cli.directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
+@cli.option(
+    "-o --output", "Table to write: its name ends in .csv, .xlsx, .mat or .parquet.", type=cli.PATH, required=True,
+)  # fmt: skip
 @cli.option(
     "--unit UNIT", name="units",
     words='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',

@@ -8,7 +8,7 @@ from hpcclear.ranks.terminal import Style
 
 @cli.command("compute", "Run a complete study.", ranks=True)
 @cli.with_scene
-@cli.directory_option("Directory for the results.")
+@cli.option("-o --output", "Directory for the results.", type=cli.PATH, required=True)
 @cli.FRESH
 @cli.LIMIT
 @cli.PROGRESS

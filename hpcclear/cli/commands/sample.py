@@ -9,7 +9,9 @@ from hpcclear.cli import options as cli
 @cli.command("compute", "Simulate many designs.", ranks=True)
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@cli.POINTS
+@cli.option(
+    "--points", "CSV table of designs, used instead of the designs of the study.", type=cli.PATH
+)
 @cli.flag(
     "--statistics",
     "Keep mean, standard deviation and histogram of Monte Carlo samples instead of the samples.",

@@ -177,8 +177,7 @@ def _mp4(pictures: Iterator[Array], program: str) -> bytes:
         target = Path(folder) / "film.mp4"
         words = [program, "-v", "error", *raw, "-i", "-", *coded]
         words += ["-flags:v", "+bitexact", "-metadata", "comment=hpcclear", str(target)]
-        every = [first, *pictures]
-        content = b"".join(one[:height, :width].tobytes() for one in every)
+        content = b"".join(one[:height, :width].tobytes() for one in (first, *pictures))
         done = subprocess.run(words, input=content, capture_output=True, check=False)
         if done.returncode != 0:
             said = done.stderr.decode(errors="replace")[-200:].strip()

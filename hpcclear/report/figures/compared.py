@@ -17,8 +17,7 @@ def overlay_figure(comparison: "Comparison") -> "style.Figure":
     at all of its instants."""
     count = len(comparison.quantities)
     figure, axes = style.grid(count, 1, 10.0 + 38.0 * count, sharex=True)
-    base = "s" if comparison.axis == "time" else "rad"
-    across = scale(comparison.shown, base)
+    across = scale(comparison.shown, "s" if comparison.axis == "time" else "rad")
     order = np.argsort(comparison.x, kind="stable")
     x, along = across(comparison.x[order]), across(comparison.series_x)
     steps = np.diff(along, prepend=along[:1])

@@ -76,8 +76,7 @@ def growth_figure(identify: Results) -> "style.Figure":
     _check(identify)
     if "rate" not in identify:
         reason = "growth needs two records with dates"
-        remedy = "Give a --signal and a --date for each"
-        raise InputError("identify", 1, reason, remedy)
+        raise InputError("identify", 1, reason, "Give a --signal and a --date for each")
     count, days = identify.sizes["unknown"], identify["elapsed"].values / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):

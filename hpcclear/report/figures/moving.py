@@ -23,8 +23,7 @@ def bodies(shown: Results) -> Drawn:
 
 def eccentricities(shown: Results) -> Array:
     """Return journal centres from bearing centres, m, shape (t, joints, 2)."""
-    both = [shown[f"eccentricity_{axis}"].values for axis in "xy"]
-    return np.stack(both, axis=-1)
+    return np.stack([shown[f"eccentricity_{axis}"].values for axis in "xy"], axis=-1)
 
 
 def pairs(points: Array, e: Array) -> list[list[int]]:
@@ -65,8 +64,7 @@ def _slider_crank(shown: Results, e: Array) -> Drawn:
     rod = np.column_stack([shown["rod_x"].values, shown["rod_y"].values])
     phi, theta = shown["crank_angle"].values, shown["rod_angle"].values
     crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
-    names = texts_in(shown, "joint")
-    known = {name: e[:, k] for k, name in enumerate(names)}
+    known = {name: e[:, k] for k, name in enumerate(texts_in(shown, "joint"))}
     near_pin, far_pin = (known.get(name, np.zeros_like(rod)) for name in JOINTS)
     # crank length * crank = rod - u2 * along + e12
     both = np.column_stack([crank.ravel(), along.ravel()])

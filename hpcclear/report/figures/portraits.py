@@ -52,12 +52,11 @@ def force_polar_figure(response: Results) -> "style.Figure":
     # colours for an angle: the ends meet, and none is as light as the page
     cyclic = ListedColormap(style.matplotlib().colormaps["twilight"](np.linspace(0.13, 0.87, 256)))
     angle, sense = motion.crank_angle(shown)
-    turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).values for c in "xy")
         radius = force(shown["contact_force"].sel(joint=joint))
         contact = radius > 0.0
-        colour = np.mod(turn, 1.0)[contact] * 360.0
+        colour = np.mod(sense * angle / motion.TURN, 1.0)[contact] * 360.0
         look: style.Look = {"s": 3.0, "cmap": cyclic, "vmin": 0.0, "vmax": 360.0, "lw": 0}
         drawn = panel.scatter(np.arctan2(y, x)[contact], radius[contact], c=colour, **look)
         panel.set_title(joint)

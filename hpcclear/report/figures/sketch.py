@@ -22,8 +22,7 @@ def key(scene: Scene) -> list[str]:
     """A line for each body, joint, drive and load: the numbers of its table that are not zero, as they are written."""
     rows = dict[str, list[str]]()
     for path in scene.numeric_paths():
-        own = scene.path_in_linkage(path)
-        row, value = _ROW.fullmatch(own), scene.number(path)
+        row, value = _ROW.fullmatch(scene.path_in_linkage(path)), scene.number(path)
         if row and value and not row[2].startswith(_LEFT_OUT):
             said = f"{re.sub('[_.]', ' ', row[2])} {labels.quantity(value, scene.unit(path))}"
             rows.setdefault(row[1], []).append(said)

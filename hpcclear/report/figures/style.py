@@ -208,8 +208,7 @@ def page(height: float, width: float | None = None) -> "Figure":
     caller gave axes."""
     matplotlib()
     if (given := _given.get()) is not None:
-        reason = "this figure has a layout of its own"
-        raise InputError("ax", len(given), reason, "Leave ax out")
+        raise InputError("ax", len(given), "this figure has a layout of its own", "Leave ax out")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

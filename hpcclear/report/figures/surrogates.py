@@ -249,7 +249,6 @@ def _finish_grid(axes: np.ndarray, used: int, across: str, up: str) -> None:
         panel.set_ylabel(up)
     for panel in axes.flat[used:]:
         panel.remove()
-    columns = axes.shape[1]
-    for k in range(max(used - columns, 0), used):
+    for k in range(max(used - axes.shape[1], 0), used):
         axes.flat[k].set_xlabel(across)
         axes.flat[k].tick_params(labelbottom=True)

@@ -100,8 +100,7 @@ def read(*places: str | Path) -> Content:
     if len(scenes) > 1:
         text = "The files in this directory were made from different scenes: do not compare them."
         troubles = [*troubles, text]
-    every = tuple(troubles)
-    return Content(place, files, responses, every, whole, samples, float(dated))
+    return Content(place, files, responses, tuple(troubles), whole, samples, float(dated))
 
 
 def scene_in(text: str) -> Scene | None:

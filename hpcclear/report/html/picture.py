@@ -133,8 +133,7 @@ def series(response: Results) -> list[dict[str, object]]:
     found = []
     for name, joint, word in motion.quantities(shown):
         one = shown[name].sel(joint=joint) if joint else shown[name]
-        values = np.nan_to_num(one.values)
-        curve = {"x": _digits(turn), "y": _digits(values)}
+        curve = {"x": _digits(turn), "y": _digits(np.nan_to_num(one.values))}
         found.append({"label": word, "unit": str(one.attrs["units"]), **curve})
     return found
 

@@ -21,11 +21,10 @@ LISTED = 40  # samples listed by number before the rest is only counted
 def screened(found: Results, content: Content) -> list[object]:
     """What each effect changes and saves, why others are kept, and the tables of the scene without what can be neglected."""
     seconds = effects.seconds_of(content.files.get("timing"))
-    kept = json.loads(found.attrs["kept"]).items()
     return [
         _changes(found, seconds),
         *effects.statements(found, seconds),
-        *(f"{name} is kept: {reason}." for name, reason in kept),
+        *(f"{name} is kept: {reason}." for name, reason in json.loads(found.attrs["kept"]).items()),
         *([preformatted(text)] if (text := _changed(found)) else []),
     ]
 
@@ -76,8 +75,7 @@ def statistics(samples: Results, content: Content) -> list[object]:
     rows = [[line.label, line.text] for line in [*lines, *spread.in_time(samples)]]
     header = ["quantity", "95 % confidence interval in brackets"]
     table = PageTable(header, rows, "Statistics of the samples")
-    warnings = [f"Warning: {text}." for text in spread.remarks(samples)]
-    return [*([table] if rows else []), *warnings]
+    return [*[table] * bool(rows), *(f"Warning: {text}." for text in spread.remarks(samples))]
 
 
 def compared(content: Content) -> list[object] | None:

@@ -37,8 +37,7 @@ def samples(found: Results, content: Content) -> Screen:
     f, unit = found["objective"].values, str(found["objective"].attrs["units"])
     names = ", ".join(labels.words(v) for v in labels.design_variables(found))
     varied = f"varied: {names}" if names else ""
-    lines = spread.statistics(found)
-    shown = {line.label: line for line in lines if line.estimate.known}
+    shown = {line.label: line for line in spread.statistics(found) if line.estimate.known}
     tiles = tuple(
         Tile(line.label, labels.quantity(line.estimate.value, unit), within=_interval(line))
         for line in shown.values()
