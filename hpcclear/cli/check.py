@@ -27,8 +27,7 @@ MOST_WARNINGS = 3
 
 
 def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
-    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
-    scene's own design can turn."""
+    """Print the model, its warnings, the study and the measured cost of a sample; return whether the design can turn."""
     from hpcclear.dynamics.planar.problem import cautions_of
     from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
@@ -284,7 +283,6 @@ def lines(found: "CornerOutcomes", simulate: bool) -> Iterator[tuple[str, str]]:
     for reason in dict.fromkeys(found.refused.values()):
         hit = np.array([found.refused.get(row) == reason for row in range(total)])
         place = failures.where(hit, columns)
-        text = f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}"
-        yield "refused", text
+        yield "refused", f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}"
     for text in failures.sentences(found.status, columns, "corners") if simulate else ():
         yield "failed", text

@@ -58,7 +58,6 @@ def describe(
 
 
 def _print_sections(out: Console, content: Content) -> None:
-    """Print all sections of the page."""
     from hpcclear.report.html.page import sections  # loads all that can be printed
 
     troubles: list[str] = []
@@ -86,8 +85,7 @@ def describe_response(response: Results, output: Path, details: bool | None = No
 
 
 def fitted(first: Screen, most: int) -> list[Text]:
-    """Return a first screen in at most so many lines: rows of the table go first, then green lines, further advice,
-    amber lines beyond the third, and the most useful advice."""
+    """Return a first screen in at most so many lines; rows of the table go first, then green lines, advice and amber lines."""
     first = first.shown()
     red, amber, _ = ([one.level for one in first.trust].count(level) for level in Level)
     left = {"rows": len(first.rows), "trust": len(first.trust), "steps": min(len(first.steps), 2)}

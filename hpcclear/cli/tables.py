@@ -58,8 +58,7 @@ def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ())
 
 
 def _widths(cells: Sequence[Sequence[str]], tie: str) -> list[int] | None:
-    """Widths of columns that break no word, the widest narrowed alike; None where these do not fit the terminal. `tie`: what
-    stands for the sign of intervals."""
+    """Widths of columns that break no word, the widest narrowed alike; None if none fit. `tie`: in place of " ± "."""
     columns = [[one.replace(" ± ", tie) for one in column] for column in zip(*cells, strict=True)]
     natural, least = (
         [max(cell_len(part) for one in column for part in split(one) or [""]) for column in columns]

@@ -87,7 +87,6 @@ def surrogate_errors(best: Results) -> list[float]:
 
 
 def _steps(of: Recommended) -> Iterator[str]:
-    """What to do, the most useful first."""
     ours, best = of.ours, of.best
     if beyond_hertz(best) > MANY:
         yield "stiffer bearings or less load"

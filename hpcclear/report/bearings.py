@@ -105,10 +105,7 @@ def torque(response: Results) -> Torque:
 
 
 def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
-    """Time mean of the contact force of joint k, N, and its share of contact.
-
-    Of the integrals that every step adds to; where the response has none, of the stored instants.
-    """
+    """Time mean of the contact force of joint k, N, and its share of contact: of integrals over steps, else of instants."""
     if "contact_impulse" in response and "revolution" in response.sizes:
         time, turned = (one[inside] for one in (response["time"].values, motion.phase(response)))
         count = min(response.sizes["revolution"], response.attrs.get("keep_revolutions", np.inf))

@@ -229,7 +229,6 @@ def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Arra
 
 
 def _signal(response: Results, column: SheetColumn, names: Mapping[str, str]) -> Signal:
-    """The signal that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
     found = signals_in(response)
     match = {plain_name(name): name for name in found}.get(plain_name(wanted))

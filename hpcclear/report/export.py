@@ -215,10 +215,7 @@ class _Exact(float):
 
 
 def _book(sheets: Mapping[str, Iterable[Sequence[object]]]) -> bytes:
-    """An Excel file of sheets by name: numbers, and text that is never a formula, below a row of headings.
-
-    Numbers that are not finite are empty cells, for Excel has none.
-    """
+    """An Excel file of sheets by name: numbers, empty where they are not finite, and text that is never a formula."""
     from xlsxwriter import Workbook
 
     buffer = io.BytesIO()

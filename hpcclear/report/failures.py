@@ -46,8 +46,7 @@ def explained(samples: Results) -> list[str]:
 def sentences(
     status: Array, columns: Sequence[SampledVariable], what: str = "samples"
 ) -> Iterator[str]:
-    """Yield a sentence for each status of failures, of outcomes (n,) and the variables of what was simulated: how many, why, in
-    which ranges of which variables, what to do."""
+    """Yield a sentence for each failure among outcomes (n,): how many, why, in which ranges of which variables, what to do."""
     for code in Status:
         failed = status == code
         if code is Status.OK or not failed.any():
@@ -58,10 +57,7 @@ def sentences(
 
 
 def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
-    """Return in which ranges of which variables failures (n,) lie; "" where all failed, as ranges then explain nothing.
-
-    A variable is named if its values in failures are distributed unlike those in the others.
-    """
+    """Return the ranges of failures (n,) in variables that are distributed otherwise in the rest; "" if all failed."""
     if failed.all():
         return ""
     least = min(max(CLEAR, SURE * np.sqrt(1.0 / failed.sum() + 1.0 / (~failed).sum())), 0.99)

@@ -69,8 +69,7 @@ class SectionOf(NamedTuple):
     title: str
     """name and title: its anchor, and its heading."""
     make: "Callable[..., Sequence[object] | None]"
-    """From the file of its kind, if it names one, and all results to its parts: texts, tables, and text whose lines stay; None
-    where there is nothing to show."""
+    """From the file of its kind, if it names one, and all results to texts, tables and lines; None where nothing is to show."""
     kind: str = ""
     """Of the file without which there is nothing to show."""
     each: bool = False

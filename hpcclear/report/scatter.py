@@ -48,8 +48,7 @@ def _inputs(own: Results, kind: str) -> tuple[list[str], np.ndarray, np.ndarray,
 
 
 def shares(own: Results) -> list[tuple[str, float, float]]:
-    """Return the random inputs of a design (of kind ``contributions``) with their shares of the variance and half-widths, the
-    largest first; correlated inputs have one together."""
+    """Return random inputs with shares of the variance and half-widths, the largest first; correlated ones together."""
     names, values, errors, rows = _inputs(own, "contribution")
     groups = own["group"].values[rows]
     parts = []
@@ -62,8 +61,7 @@ def shares(own: Results) -> list[tuple[str, float, float]]:
 
 
 def tighten(own: Results) -> str:
-    """Return which inputs of a design (of kind ``contributions``) to tighten first, and by how much the scatter then falls; ""
-    where there are not several."""
+    """Return which inputs to tighten first, and by how much the scatter then falls; "" where there are not several."""
     names, falls, errors, rows = _inputs(own, "halved")
     if len(rows) < 2:
         return ""
@@ -81,8 +79,7 @@ def tighten(own: Results) -> str:
 
 
 def to_tighten(falls: Array, errors: Array, prices: Array) -> tuple[list[int], bool]:
-    """Return which inputs to tighten first, three at most, and whether by their prices: those that bring most, or most for
-    what it costs where that is known; `falls`, their `errors` and `prices` (n,)."""
+    """Return up to three inputs that bring most, or most for their prices, and whether these are known; arguments (n,)."""
     brings = falls > np.maximum(HALF_WIDTH * errors, WORTH)
     known = prices.size > 0 and bool((prices[brings] > 0.0).all())
     merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls

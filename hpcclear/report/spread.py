@@ -165,10 +165,7 @@ def shares(samples: Results, thresholds: Sequence[Beyond]) -> list[Line]:
 def side_by_side(
     every: Mapping[str, Results], thresholds: Sequence[str] = ()
 ) -> dict[str, dict[str, Line]]:
-    """Return the lines of `statistics` of several samples: by the name of each, then by label.
-
-    Thresholds are those of users, as `beyond` reads them.
-    """
+    """Return the lines of `statistics` of several samples, by their names, then by label; thresholds as `beyond` reads them."""
     found = {}
     for name, samples in every.items():
         units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}

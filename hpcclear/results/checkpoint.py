@@ -64,8 +64,7 @@ def discard(directory: Path) -> None:
 
 @dataclass
 class _Part:
-    """One file; `span`: its least and largest sample; `held`: its samples, unless there are so many that only the file has
-    them."""
+    """One file; `span`: its least and largest sample; `held`: its samples, None of so many that only the file has them."""
 
     level: int
     path: Path
@@ -125,10 +124,7 @@ class Checkpoint:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has gathered, now; nothing happens when nothing has.
-
-        Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory, and a later call tries again.
-        """
+        """Write what has gathered. Raises InputError, StorageError if the disk refuses: the samples stay for another try."""
         if self._buffer:
             records, values = zip(*self._buffer, strict=True)
             self._write_part(0, np.concatenate(records), np.concatenate(values))
@@ -197,19 +193,13 @@ class Checkpoint:
     # -- stages ---------------------------------------------------------------------------------
 
     def save_stage(self, name: str, data: Mapping[str, ArrayLike]) -> None:
-        """Write the results of a stage: arrays of any shape, numbers, truth values, text; raises as `flush`.
-
-        `name`: of letters, digits, ``_`` and ``-``.
-        """
+        """Write a stage: arrays of numbers, truth values, text. `name`: of letters, digits, ``_``, ``-``. Raises as `flush`."""
         variables = {key: _stage_variable(key, values) for key, values in data.items()}
         content = Results(variables, {**self.attributes, "stage": name})
         dataset.write(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
-        """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
-
-        Raises InputError: the file is another run's.
-        """
+        """What `save_stage` wrote; None if not there or damaged (`problems`). Raises InputError: it is another run's."""
         path = self._stage_path(name)
         if not path.exists():
             return None

@@ -128,10 +128,7 @@ def _design_row(
 
 
 def variable_name(name: str, kind: str = "samples") -> str:
-    """The name a design variable has in a file: a scene path with its dots as underscores.
-
-    Raises InputError: the name is no name, or a result is called so.
-    """
+    """A design variable's name in a file, underscores for dots. Raises InputError: it is no name, or a result is called so."""
     plain = name.replace(".", "_")
     reason = "a result has this name" if plain in KINDS[kind].table else ""
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", plain) is None:
@@ -316,10 +313,7 @@ def read(path: FilePath, kind: str | None = None, scene_hash: str | None = None)
 
 
 def files_in(directory: Path) -> list[Path]:
-    """Result files of a directory and of its folder ``responses``, in order; not those of runs under way.
-
-    Raises InputError: there is no such directory, or no result in it.
-    """
+    """Result files of a directory and of its folder ``responses``, in order. Raises InputError where there are none."""
     found = [*sorted(directory.glob("*.nc")), *sorted((directory / "responses").glob("*.nc"))]
     if not found:
         reason = "this is a file" if directory.exists() else "there is no such directory"

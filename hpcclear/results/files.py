@@ -149,10 +149,7 @@ def fsync_directory(descriptor: int) -> None:
 
 
 def probe(path: Path, mark: bytes = b"") -> None:
-    """Refuse a place that `path` could not be written to, before hours are spent computing for it.
-
-    `mark`: of the kind of file, as for `write_bytes`. Raises InputError, StorageError as `write_bytes`.
-    """
+    """Refuse a place that `write_bytes` could not write to, before hours are spent on it; arguments and errors as there."""
     refuse_foreign(path, mark)
     with _opened(path) as (directory, name):
         trial = _aside(name)

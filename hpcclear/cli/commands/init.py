@@ -101,7 +101,6 @@ def _copy_jobs(place: Path) -> None:
 
 
 def _import(source: Path, file: Path, unit: str, sketch: Path | None) -> None:
-    """Write the linkage of a table or drawing as a scene; draw it."""
     from hpcclear.cli.check import draw
     from hpcclear.results import files
     from hpcclear.scene import importers, load_scene

@@ -94,7 +94,6 @@ def run(
 
 
 def _film(content: "Content", place: Path, seconds: float, revolutions: int) -> None:
-    """A film of the first response."""
     from hpcclear.report.figures.animation import animate
 
     if content.response is None:
@@ -112,7 +111,6 @@ def _known(option: str, name: str, every: Mapping[str, One]) -> One:
 
 
 def _label(text: str) -> tuple[str, str]:
-    """Name and words of a label."""
     name, sign, words = text.partition("=")
     if not (name.strip() and sign and words.strip()):
         raise InputError("--label", text, "it names no words", 'Write NAME="words"')

@@ -86,7 +86,6 @@ def _laws() -> None:
 
 
 def _names() -> None:
-    """Print the names alone, in the lines of a terminal."""
     from hpcclear import plugins
     from hpcclear.cli.terminal import show_rows
     from hpcclear.scene.laws import known_laws

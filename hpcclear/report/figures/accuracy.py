@@ -137,8 +137,7 @@ def surrogate_figure(accuracy: Results) -> "style.Figure":
 
 @style.drawn
 def random_inputs_figure(accuracy: Results) -> "style.Figure":
-    """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
-    bias."""
+    """Error of mean and standard deviation against Monte Carlo size and time, with 95 % CI; the surrogate's bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
     for row, moment in enumerate(accuracy["moment"].values):
         here = accuracy.sel(moment=moment)

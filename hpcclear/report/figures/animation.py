@@ -158,7 +158,6 @@ def _gif(pictures: Iterator[Array]) -> bytes:
 
 
 def _ffmpeg(place: Path) -> str:
-    """The program ffmpeg; InputError if there is none."""
     program = shutil.which("ffmpeg")
     if program is None:
         reason = "MP4 needs the program ffmpeg, which is not installed"

@@ -11,8 +11,7 @@ from hpcclear.results.content import Results
 def drawings(
     files: Files, responses: Mapping[str, Results]
 ) -> "dict[str, Callable[[], style.Figure]]":
-    """Return what draws each figure that results allow, by its name: of files by their kinds, and of responses by the names of
-    designs, several of which figures show beside each other."""
+    """Return what draws each figure that results allow, by its name; of several responses, by design, figures have columns."""
     made = {one.name: one.of(files) for one in declared(FigureOf) if one.kind in files}
     if responses:
         first = next(iter(responses.values()))

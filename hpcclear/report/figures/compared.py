@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
 @style.drawn
 def overlay_figure(comparison: "Comparison") -> "style.Figure":
-    """Each quantity over the measured time or angle, in the units of the measurement: the measured points, and the simulation
-    at all of its instants."""
+    """Each quantity over the measured time or angle, in measured units: measured points, and all instants of the simulation."""
     count = len(comparison.quantities)
     figure, axes = style.grid(count, 1, 10.0 + 38.0 * count, sharex=True)
     across = scale(comparison.shown, "s" if comparison.axis == "time" else "rad")

@@ -104,8 +104,7 @@ def draw(
     height: float,
     across: tuple[float, float] = (0.0, 1.0),
 ) -> None:
-    """Draw curves below one another, from `top` down, each `height` high, from a place across over a width; shares of the
-    figure."""
+    """Draw curves below one another from `top` down, each `height` high; `across`: left end and width; shares of the figure."""
     left, width = across
     for number, curve in enumerate(curves):
         bottom = top - (number + 1) * height
@@ -114,7 +113,6 @@ def draw(
 
 
 def _curve(axes: "style.Axes", curve: Tabulated) -> None:
-    """One of them."""
     places, values = np.array(curve.rows).T
     shown = labels.scale(curve.unit, values)
     by = _BY.get(curve.over, _TURNING) if curve.over != "distance" else labels.scale("m", places)

@@ -77,8 +77,7 @@ def _goals(one: Results) -> list[_Goal]:
 
 
 def searched(one: Results) -> dict[str, tuple[str, str]]:
-    """Words and unit of what a case makes small, from its part of the fronts (kind ``front``), by the variable; none where that
-    is mean and standard deviation."""
+    """Words and unit of what a case makes small, by the variable of its front; none if that is mean and standard deviation."""
     names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
     every = {n: (text_in(one, f"{n}_goal"), text_in(one, f"{n}_unit")) for n in names}
     return {name: row for name, row in every.items() if row[0]}
@@ -94,7 +93,6 @@ def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:
 
 
 def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
-    """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].values):
         row = one.sel(run=run)
         points = [goal.scale(row[goal.searched]) for goal in (x, y)]
@@ -170,8 +168,7 @@ def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 @style.drawn
 def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
-    """Responses (kind ``response``) of designs by their names, over the last two revolutions, that of the baseline design
-    first (the paper's Fig. 10). Raises InputError without any."""
+    """Responses of designs by name over two revolutions, the baseline first (the paper's Fig. 10); InputError without any."""
     if not responses:
         reason = "there is no response to draw"
         raise InputError("responses", 0, reason, "Give the response of each design")

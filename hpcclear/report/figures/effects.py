@@ -154,10 +154,7 @@ def caption(effects: Results, timing: Results | None) -> str:
 
 @style.figure(caption)
 def effects_figure(effects: Results, timing: Results | None = None) -> "style.Figure":
-    """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
-
-    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
-    """
+    """Change of f by each effect with its confidence interval, and its run time, by evaluations where `timing` is missing."""
     off = effects["off"].values
     seconds = seconds_of(timing)
     rows = [k for k in range(1, len(off)) if off[k].sum() == 1]

@@ -38,8 +38,7 @@ def touches(response: Results) -> list[Touch]:
 
 @style.figure("offset, tilt and contacts in guides", 40, along="guide")
 def guide_figure(response: Results) -> "style.Figure":
-    """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last two revolutions of a
-    response (kind ``response``). Raises InputError where no guide has clearance."""
+    """Offset, tilt and contacts of sliders over the last two revolutions. Raises InputError where no guide has clearance."""
     if "guide" not in response.sizes:
         remedy = "Give a slide a clearance, length, height and corner_radius"
         raise InputError("guide", "", "no guide of this mechanism has clearance", remedy)

@@ -24,8 +24,7 @@ def _entry(identify: Results, unknown: int, scale: labels.Scale) -> str:
 
 @style.figure("Posterior of each unknown with its calibrated 95 % interval.")
 def posterior_figure(identify: Results) -> "style.Figure":
-    """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``. Raises
-    InputError where no signal was measured."""
+    """Posterior of each unknown, a line a record, with its 95 % interval below. Raises InputError if no signal was measured."""
     _check(identify)
     count = identify.sizes["unknown"]
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
@@ -50,8 +49,7 @@ def posterior_figure(identify: Results) -> "style.Figure":
     "Measured less predicted features of the last record, in standard deviations of the prediction.", 1
 )  # fmt: skip
 def features_figure(identify: Results) -> "style.Figure":
-    """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
-    Raises InputError where no signal was measured."""
+    """Standard score of each measured feature of the last record. Raises InputError where no signal was measured."""
     _check(identify)
     last = identify.isel(record=-1)
     measured, predicted = last["measured"].values, last["predicted"].values
@@ -71,8 +69,7 @@ def features_figure(identify: Results) -> "style.Figure":
 
 @style.figure("Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2)
 def growth_figure(identify: Results) -> "style.Figure":
-    """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
-    Raises InputError where there is one record only, or none has a date."""
+    """Median and 95 % interval at each record, rate of growth, and limit. Raises InputError without two records with dates."""
     _check(identify)
     if "rate" not in identify:
         reason = "growth needs two records with dates"

@@ -96,8 +96,7 @@ class Lettering:
             self.line(lead, colour, 0.4, zorder=3)
 
     def dimension(self, ends: ArrayLike, text: str, along: Array, levels: Array) -> None:
-        """Draw a dimension line along a direction (2,) between two places (2, 2), at one of the levels across it (m) that has
-        room, if any has."""
+        """Draw a dimension line along a direction (2,) between two places (2, 2), at a level (m) with room, if any has."""
         written, size = self._written(text, "ink")
         across, best, least = np.array([-along[1], along[0]]), None, np.inf
         places = np.asarray(ends, float)

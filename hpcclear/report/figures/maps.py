@@ -23,8 +23,7 @@ _EXPONENT = "largest Lyapunov exponent (1/revolution)"
     kind="map",
 )
 def map_figure(samples: Results) -> "style.Figure":
-    """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval. Raises InputError
-    where the dataset is no map."""
+    """Exponent, period and regime of each cell; along a line also f with its interval. Raises InputError of what is no map."""
     cells = cells_of(samples)
     names = [str(name) for name in cells["objective"].dims]
     return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
@@ -108,9 +107,7 @@ def _line(cells: Results, name: str) -> "style.Figure":
     "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions."
 )
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
-    """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``). A motion that repeats
-    every revolution is one dot over its value, one that repeats every n is n dots. Raises InputError where the dataset is no
-    bifurcation."""
+    """Values once a revolution against the varied entry; n dots where the motion repeats every n. InputError of other kinds."""
     variables = labels.design_variables(bifurcation)
     if not variables or bifurcation.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"

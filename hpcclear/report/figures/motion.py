@@ -12,8 +12,7 @@ TURN = 2.0 * np.pi
 
 
 def phase(response: Results) -> Array:
-    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
-    way it turns."""
+    """Progress of the drive, rad, 2 pi a turn or swing, shape (time,); of a slider-crank the crank angle, turned to rise."""
     if "drive_phase" in response:
         return response["drive_phase"].values
     angle = response["crank_angle"].values
@@ -97,8 +96,7 @@ def quantities(response: Results) -> list[tuple[str, str, str]]:
 
 
 def followed(response: Results) -> tuple[Variable, Variable]:
-    """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
-    the axis on which it moves further."""
+    """Place and speed of the output: the slider, or a linkage's last body by its angle, or x or y if it does not turn."""
     if "slider_position" in response:
         return response["slider_position"], response["slider_velocity"]
     last = response.isel(body=-1)
@@ -119,10 +117,7 @@ def clearances(response: Results) -> Array:
 
 
 def reaches(response: Results) -> Array:
-    """Eccentricity |e| at which each joint touches, m, shape (joints,); NaN where it never did.
-
-    Penetration is |e| less that, so it follows from contact: the radial clearance of a pin.
-    """
+    """Eccentricity |e| at which each joint touches, m, shape (joints,): |e| less penetration in contact; NaN without any."""
     reach = eccentricity(response)
     depth = response["penetration"].values
     found = np.full(depth.shape[1], np.nan)

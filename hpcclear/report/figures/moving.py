@@ -27,8 +27,7 @@ def eccentricities(shown: Results) -> Array:
 
 
 def pairs(points: Array, e: Array) -> list[list[int]]:
-    """Return the two points of each joint, journal's and bearing's, whose distance is its eccentricity (t, joints, 2) at every
-    instant; `points`: as of `bodies`."""
+    """Return the points of journal and bearing of each joint, which are always its eccentricity (t, joints, 2) apart."""
     count, found = points.shape[1], []
     for joint in range(e.shape[1]):
         off = points[:, :, None] - points[:, None, :] - e[:, joint, None, None]

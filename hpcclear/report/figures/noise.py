@@ -1,5 +1,4 @@
-"""Impact and noise in one response: what a revolution has of impacts in each joint and how loud its forces are, in words; force
-levels as third octaves with their confidence intervals, and orders, as a figure."""
+"""Impact and noise in one response: impacts in each joint and the loudest bands in words; force levels and orders drawn."""
 
 from collections.abc import Iterator
 
@@ -75,8 +74,7 @@ FALL = 80.0
 
 @style.figure("force levels and orders", 80, along="band")
 def noise_figure(response: Results) -> "style.Figure":
-    """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
-    squares of their orders. Raises InputError where the response has no levels."""
+    """Third-octave levels of forces with 95 % CI, and RMS of their orders. Raises InputError where there are no levels."""
     if "band" not in response:
         remedy = "Give a joint clearance, and store 64 instants a revolution or more"
         raise InputError("noise", "", "this response has no force levels", remedy)

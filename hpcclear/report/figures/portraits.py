@@ -13,8 +13,7 @@ from hpcclear.results.content import Results, texts_in
 
 @style.figure("journal-centre orbits in the clearance circle", 10)
 def orbit_figure(response: Results) -> "style.Figure":
-    """Orbit of the journal centres in the clearance circle, contact distinguished from free flight, over the later half of the
-    revolutions of a response (kind ``response``)."""
+    """Orbits of journal centres, contact distinguished from free flight, over the later half of the revolutions."""
     shown = motion.of_pins(motion.steady(response))
     joints = texts_in(shown, "joint")
     figure, axes = style.side_by_side(len(joints), min(style.across(), style.WIDTH))
@@ -69,10 +68,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
 
 @style.figure("phase portraits", 50)
 def phase_figure(response: Results) -> "style.Figure":
-    """Phase portraits: velocity of the slider over its position, acceleration over velocity.
-
-    Of a linkage, speed of its last body over its angle or place. Over the same revolutions as `orbit_figure`.
-    """
+    """Phase portraits of the slider, or of a linkage's last body, over the same revolutions as `orbit_figure`."""
     from matplotlib.collections import LineCollection
 
     shown = motion.steady(response)
@@ -97,7 +93,6 @@ def phase_figure(response: Results) -> "style.Figure":
 def _bar(
     figure: "style.Figure", drawn: Any, panels: "Sequence[style.Axes] | np.ndarray", words: str
 ) -> Any:
-    """The colour bar below all panels."""
     look: style.Look = {"location": "bottom", "aspect": 50, "pad": 0.02, "label": words}
     return figure.colorbar(drawn, ax=list(panels), **look)
 

@@ -165,7 +165,6 @@ def renamed(
 
 
 def _texts(figure: "Figure", panels: "Sequence[Axes]") -> "Iterator[Text]":
-    """Labels, titles and legends."""
     for panel in panels:
         yield from (panel.xaxis.label, panel.yaxis.label, *titles(panel).values())
         yield from (child.xaxis.label for child in panel.child_axes)

@@ -9,8 +9,7 @@ from hpcclear.results.content import Results, texts_in
 
 @style.drawn
 def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure":
-    """Slider motion, where there is a slider, contact forces and torque of the drive over the last two revolutions of a
-    response (kind ``response``); of several by the names of their designs what `comparison_figure` shows."""
+    """Slider motion, contact forces and drive torque over two revolutions; of several responses `comparison_figure`."""
     if every := style.several(responses):
         return designs.comparison_figure(every)
     shown = motion.latest(cast(Results, responses))
@@ -55,8 +54,7 @@ def penetration_figure(response: Results) -> "style.Figure":
 
 @style.figure("energy balance", 90)
 def energy_figure(response: Results) -> "style.Figure":
-    """Energy balance of a response (kind ``response``): work of drive and loads and dissipated energy since the start, stored
-    energy, and the residual."""
+    """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual."""
     figure, axes = style.grid(3, 1, 120.0, sharex=True, height_ratios=[1.2, 1.2, 0.8])
     turn = motion.turns(response)
     balances = {

@@ -14,8 +14,7 @@ from hpcclear.results.content import Results, Variable
     "Objective against each design variable, its cycle-to-cycle standard deviation and histogram."
 )
 def samples_figure(samples: Results) -> "style.Figure":
-    """Objective of samples (kind ``samples``) against every design variable, coloured by clearance; its spread, histogram and
-    failures. Raises InputError where there is no design variable to draw against."""
+    """Objective against each design variable, coloured by clearance; its spread and histogram. InputError without any."""
     variables = labels.design_variables(samples)
     if not variables:
         reason = "there is no design variable to draw the objective against"
@@ -104,10 +103,7 @@ def _cloud(axes: "style.Axes", variable: Variable, result: Variable, shade: Vari
 
 
 def binned(x: Array, y: Array) -> tuple[Array, Array]:
-    """Middles of bins of equal width and the median of y in them, from x and y of shape (n,).
-
-    Bins of fewer than five points are left out.
-    """
+    """Middles of bins of equal width with five points or more, and the median of y in them; x, y: (n,)."""
     if len(x) < 10 or not np.ptp(x) > 0.0:
         return np.zeros(0), np.zeros(0)
     edges = np.linspace(x.min(), x.max(), min(12, len(x) // 5) + 1)

@@ -65,12 +65,11 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
     axes = figure.add_axes((0.0, 1.0 - drawn / height, width / _WIDTH, drawn / height))
     remark = drawing.draw(axes, scene, poses)
     curves.draw(figure, tables, 1.0, curves.HEIGHT / height, (width / _WIDTH, _BESIDE / _WIDTH))
-    look: style.Look = {"va": "top"}
     top = 1.0 - (above + 0.5 * _LINE) / height
-    figure.text(0.02, top, remark, **look)
+    figure.text(0.02, top, remark, va="top")
     for x, lines in zip((0.02, 0.52), columns, strict=True):
         text = "\n".join(map(labels.literal, lines))
-        figure.text(x, top - 1.5 * _LINE / height, text, linespacing=1.35, **look)
+        figure.text(x, top - 1.5 * _LINE / height, text, linespacing=1.35, va="top")
     return figure
 
 
@@ -79,8 +78,7 @@ _PICTURE = 95.0  # mm of width of a drawing alone
 
 @style.figure("the mechanism to scale, with its dimensions", 5)
 def mechanism_figure(response: Results, before: Results | None = None) -> "style.Figure":
-    """The mechanism of a response (kind ``response``) to scale, with dimensions; beside that of another design, parts that
-    differ are coloured and its outline is dashed. Raises InputError where the file does not hold its scene whole."""
+    """The mechanism to scale; what differs from another design is coloured. InputError where the file lacks the scene."""
     scene, poses = _posed(response)
     other = None if before is None else _posed(before)
     changed = None if other is None else changes(scene, other[0])
@@ -88,8 +86,7 @@ def mechanism_figure(response: Results, before: Results | None = None) -> "style
     figure = style.page(height, _PICTURE)
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, _LINE / height, 1.0, 1.0 - _LINE / height))
-    remark = drawing.draw(axes, scene, poses, changed, other)
-    figure.text(0.02, 0.5 * _LINE / height, remark)
+    figure.text(0.02, 0.5 * _LINE / height, drawing.draw(axes, scene, poses, changed, other))
     return figure
 
 

@@ -36,8 +36,7 @@ from hpcclear.results.names import DESIGN_VARIABLES, KINDS
 
 
 def taken(kind: str, given: Any) -> Any:
-    """Return results for what is given to a figure's argument, which is called as the `kind` of its file. Raises InputError
-    for arrays that are not those of a file of the kind."""
+    """Return results for a figure's argument, called as the `kind` of its file. Raises InputError of other arrays."""
     if hasattr(given, "data_vars"):
         return Results.of(given)
     if not isinstance(given, Mapping) or kind not in (*KINDS, "responses"):
@@ -204,8 +203,7 @@ def across() -> float:
 
 
 def page(height: float, width: float | None = None) -> "Figure":
-    """An empty figure of a height and a width in mm, by default a column's, or as a user wants it. Raises InputError if the
-    caller gave axes."""
+    """An empty figure, mm, by default as wide as a column, or as a user wants it. Raises InputError if the caller gave axes."""
     matplotlib()
     if (given := _given.get()) is not None:
         raise InputError("ax", len(given), "this figure has a layout of its own", "Leave ax out")
@@ -225,8 +223,7 @@ def page(height: float, width: float | None = None) -> "Figure":
 def mosaic(
     cells: Sequence[Sequence[str]], height: float, **options: Any
 ) -> "tuple[Figure, dict[str, Axes]]":
-    """A page of panels by their names (``"."`` is an empty place), or the caller's axes in the order of the names. Raises
-    InputError if the caller gave another number of axes."""
+    """A page of panels by name (``"."``: none), or the caller's axes in this order; InputError of another number."""
 
     def make(figure: "Figure", count: int) -> "Panels":
         empty = {f"{k} .": "." for k in range(count)}
@@ -240,8 +237,7 @@ def mosaic(
 
 
 def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`. Raises
-    InputError if the caller gave another number of axes."""
+    """A page of equal panels, or the caller's axes, (rows, columns); options of `Figure.subplots`, errors as of `mosaic`."""
 
     def make(figure: "Figure", count: int) -> "Panels":
         shared = {"sharey": "row"} if count > 1 else {}
@@ -352,8 +348,7 @@ def _in_columns(make: "Callable[..., Legend]", most: int, room: float) -> "Legen
 
 
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
-    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes. Raises InputError if its labels
-    do not fit the size that a user wants."""
+    """Bytes of a figure as ``png``, ``svg`` or ``pdf``, equal for equal figures. Raises InputError if labels do not fit."""
     buffer, user = io.BytesIO(), _users.get(figure, Printing())
     engine, dots = figure.get_layout_engine(), figure.get_dpi()
     none = {"backend": "agg", "figure.autolayout": False, "figure.constrained_layout.use": False}

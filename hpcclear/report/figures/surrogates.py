@@ -104,8 +104,7 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
     "indices (with interactions; their sum may exceed 1).", 1
 )  # fmt: skip
 def sobol_figure(sensitivity: Results) -> "style.Figure":
-    """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors. Raises
-    InputError where the file has no Sobol indices."""
+    """First-order and total Sobol indices with two standard errors. Raises InputError where the file has none."""
     if "sobol_total" not in sensitivity:
         reason = "the study did not compute Sobol indices"
         remedy = "Set it to a power of two and run again"

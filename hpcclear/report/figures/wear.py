@@ -12,8 +12,7 @@ from hpcclear.results.content import Results, texts_in
     name="wear",
 )
 def fan_figure(wear: Results) -> "style.Figure":
-    """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
-    (kind ``wear``)."""
+    """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %, and single lives."""
     joints = texts_in(wear, "joint")
     figure, axes = style.grid(len(joints) + 1, 1, 30.0 + 45.0 * (len(joints) + 1))
     cycles = wear["cycle"].values
@@ -40,8 +39,7 @@ def fan_figure(wear: Results) -> "style.Figure":
 
 @style.figure("Survival, with 95 % confidence interval (Clopper and Pearson).", 1)
 def survival_figure(wear: Results) -> "style.Figure":
-    """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``). Raises InputError
-    where no limit was given that could end a life."""
+    """Share of lives that are not over, with its 95 % confidence interval. Raises InputError where no limit ends a life."""
     if not any(name.startswith("limit_") for name in wear.attrs):
         reason, remedy = "no limit ends a service life", "Give one, such as clearance"
         raise InputError("wear.limit", None, reason, remedy)
@@ -74,8 +72,7 @@ AGES = 4
     name="wear-profile",
 )  # fmt: skip
 def profile_figure(wear: Results) -> "style.Figure":
-    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``). Raises
-    InputError where surfaces wear evenly."""
+    """Depth of wear around worn bearings and journals at several ages. Raises InputError where surfaces wear evenly."""
     if "bearing_profile" not in wear:
         reason = "wear is uniform around the surfaces: there is no profile"
         raise InputError("wear.profile", "uniform", reason, 'Set it to "angular"')

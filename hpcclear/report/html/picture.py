@@ -88,8 +88,7 @@ Goal = tuple[str, float, float, float]
 
 
 def _goals(one: Results) -> dict[str, Goal]:
-    """Mean and standard deviation of f, which every design has, and what its case makes small, by simulation, by their
-    words."""
+    """Mean and standard deviation of f, and objectives of the case, by simulation, by their words."""
     units = {name: str(one[f"{name}_true"].attrs["units"]) for name in _WORDS}
     every = dict(zip(_USUAL, units.items(), strict=True))
     for name in goals_of(one):
@@ -139,8 +138,7 @@ def series(response: Results) -> list[dict[str, object]]:
 
 
 def frames(response: Results, before: Results) -> dict[str, object]:
-    """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs; which bodies differ from
-    those of the response before."""
+    """Bodies and joints by their points over two revolutions; which bodies differ from those of the response before."""
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))

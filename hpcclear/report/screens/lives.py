@@ -140,8 +140,7 @@ def _failed(lives: Results) -> list[str]:
 
 
 def doubts(content: Results) -> Iterator[str]:
-    """Yield warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
-    state."""
+    """Yield warnings on service lives, a sentence each: scatter of wear rates, motion before its steady state, grooves."""
     if unsure := int((content["flags"].values == Flag.TARGET_MISSED).sum()):
         yield f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
     drift = content["drift"].values
