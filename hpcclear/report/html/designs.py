@@ -12,7 +12,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, number
 from hpcclear.report.merit import counts, is_plain, recommended, role
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results, each, text_in, texts_in
+from hpcclear.results.content import Results, Variable, each, text_in, texts_in
 
 LIGHTER = 0.01
 """Relative difference of the varied masses above which another design is called the lightest."""
@@ -126,13 +126,9 @@ def table_of(
         header += [*(f"objective {k + 1}" for k in range(len(asked))), "constraints"]
     rows = []
     for k, words in enumerate(shown.values()):
-        row: list[object] = [words]
-        for scale, (variable, _) in zip(scales, known, strict=True):
-            if variable.attrs.get("options") and np.isfinite(variable[k]):
-                row.append(labels.value(variable[k]))
-                continue
-            row.append(Number(_cell(chosen.isel(design=k), str(variable.name), scale)))
-        rows.append([*row, *_goals(chosen.isel(design=k), asked)])
+        one = chosen.isel(design=k)
+        cells = (_cell(one[v.name], one, s) for s, (v, _) in zip(scales, known, strict=True))
+        rows.append([words, *cells, *_goals(one, asked)])
     return PageTable(header, rows, caption)
 
 
@@ -148,11 +144,13 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
     return [*cells, "; ".join(worded(one)) or "none"]
 
 
-def _cell(one: Results, name: str, scale: labels.Scale) -> str:
-    """A value, if it was simulated with the half-width of its confidence interval."""
-    value, low, high = np.array(labels.estimate(one, name.removesuffix("_true"))) * scale.factor
+def _cell(own: Variable, one: Results, scale: labels.Scale) -> str:
+    """A value of a design, if it was simulated with the half-width of its confidence interval; of a choice its name."""
+    if labels.options(own) and np.isfinite(own):
+        return labels.value(own)
+    value, low, high = np.array(labels.estimate(one, own.name.removesuffix("_true"))) * scale.factor
     known = np.isfinite([value, low]).all()
-    return labels.paired(value, (high - low) / 2) if known else number(value)
+    return Number(labels.paired(value, (high - low) / 2)) if known else number(value)
 
 
 PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs, "verification"),)

@@ -8,7 +8,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.designs import SIMULATED, table_of
 from hpcclear.report.html.markup import PageTable, number
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import each, text_in
+from hpcclear.results.content import Results, each, text_in
 
 _BADGES = {
     Verdict.HOLDS: {"words": "✓ holds", "kind": "holds"},
@@ -20,25 +20,20 @@ _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. 
 """Variables of kind ``verification``, and the heads of their columns."""
 
 
-def readings(content: Content) -> list[object] | None:
+def readings(found: Results) -> list[object]:
     """How far the paper's designs are from what it prints, under the possible readings of its text."""
-    found = content.files.get("readings")
-    if found is None:
-        return None
-    far, texts = found["distance"].values if "distance" in found else np.array([]), []
+    far = found["distance"].values if "distance" in found else np.array([])
     if not np.isfinite(far).any():
-        return None
-    for word, k in (("nearest", np.nanargmin(far)), ("farthest", np.nanargmax(far))):
-        texts.append(f"{word} ({number(far[k], 3)}): {found['reading'].values[k]}")
+        return []
+    ends = {"nearest": np.nanargmin(far), "farthest": np.nanargmax(far)}
+    names = found["reading"].values
+    texts = (f"{word} ({number(far[k], 3)}): {names[k]}" for word, k in ends.items())
     by = "by the root mean square of ln(mean / printed mean)"
     return [f"Of {len(far)} readings of the paper's text, {by}: {'; '.join(texts)}."]
 
 
-def claims(content: Content) -> list[object] | None:
+def claims(found: Results) -> list[object]:
     """The paper's claims with our verdicts, the numbers of them first."""
-    found = content.files.get("claims")
-    if found is None:
-        return None
     verdicts = found["verdict"].values.tolist()
     counts = [verdicts.count(verdict) for verdict in Verdict]
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
@@ -49,10 +44,9 @@ def claims(content: Content) -> list[object] | None:
     return [held, PageTable(["claim", "verdict"], rows, title)]
 
 
-def designs_of_a_paper(content: Content) -> list[object]:
+def designs_of_a_paper(verified: Results) -> list[object]:
     """Words and table of the designs that a publication prints; nothing without any."""
-    verified = content.files.get("verification")
-    if verified is None or "mean_paper" not in verified:
+    if "mean_paper" not in verified:
         return []
     printed = [text_in(k, "design") for k in each(verified, "design") if labels.is_printed(k)]
     unlike = "match neither the standard deviation nor the variance of f in this model"
@@ -62,10 +56,11 @@ def designs_of_a_paper(content: Content) -> list[object]:
     return [words, table_of(verified, dict(zip(printed, printed, strict=True)), columns, title)]
 
 
-def paper(content: Content) -> list[object] | None:
-    """The paper's claims, its designs and how its text can be read; None for a study of another scene."""
-    parts = [claims(content), designs_of_a_paper(content), readings(content)]
-    return [one for part in parts for one in part or ()] or None
+def paper(content: Content) -> list[object]:
+    """The paper's claims, its designs and how its text can be read; nothing for a study of another scene."""
+    makers = {"claims": claims, "verification": designs_of_a_paper, "readings": readings}
+    parts = (make(content.files[kind]) for kind, make in makers.items() if kind in content.files)
+    return [one for part in parts for one in part]
 
 
 PARTS = (SectionOf(10, "paper", "claims", "Claims and printed designs", paper),)
