@@ -47,18 +47,8 @@ def swing(force, stiffness):
     return 1.5 * stiffness ** (2 / 3) * force ** (1 / 3)
 
 
-def exponent():
-    """Of the depth."""
-    return 1.5
-
-
-def damping(damping):
-    """Factor of the rate, or of the rate over the impact speed."""
-    return damping
-
-
 HERTZIAN: dict[str, Any] = {
-    "elastic": elastic, "energy": energy, "swing": swing, "exponent": exponent, "damping": damping,
+    "elastic": elastic, "energy": energy, "swing": swing, "exponent": lambda: 1.5, "damping": lambda damping: damping,
     "without_loss": "hertz",
 }  # fmt: skip
 """What all laws have whose elastic part is Hertz's."""

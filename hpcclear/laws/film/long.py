@@ -49,17 +49,14 @@ def force(par, row, scale, place, w, s2, i, W):
     return turned_against(scale, along, across, mx, my)
 
 
-def scale(viscosity, film_length, bearing_radius, clearance):
-    """N s/m."""
-    return 12.0 * viscosity * film_length * (bearing_radius / clearance) ** 3
-
-
 LAW = FilmLaw(
     words="film of a long bearing, around which oil flows",
     source="Sommerfeld 1904",
     formula="12 mu L R^3/c^3 (...), half-Sommerfeld around 2 w + e (e.w)/c^2",
     valid="bearings from two diameters in length on",
     force=force,
-    scale=scale,
+    scale=lambda viscosity, film_length, bearing_radius, clearance: (
+        12.0 * viscosity * film_length * (bearing_radius / clearance) ** 3
+    ),
     lengths=(2.0, math.inf),
 )

@@ -60,11 +60,6 @@ def check(values):
     return None
 
 
-def largest(static_coefficient, bristle_stiffness):
-    """What steady sliding keeps at most, m."""
-    return max(static_coefficient, LEAST_RATIO) / bristle_stiffness
-
-
 def simpler(values, gentle):
     """Coulomb's law, which does not stick."""
     speed = max(values["stribeck_speed"], gentle(values["coefficient"]))
@@ -101,7 +96,7 @@ LAW = FrictionLaw(
     numbers={"inverse_speed": "s/m", "bristles": "1/m", "damper": "s/m"},
     ratio=ratio,
     deflection=deflection,
-    largest=largest,
+    largest=lambda static_coefficient, bristle_stiffness: max(static_coefficient, LEAST_RATIO) / bristle_stiffness,
     inverse_ramp=lambda: 0.0,  # bristles hold at any speed
     steepness=lambda: 0.0,
     check=check,

@@ -51,12 +51,13 @@ def _cubics(depths: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, float]:
     return curve.c, float(curve(depths[-1], 1))
 
 
-def _parts(depths: np.ndarray) -> list[str]:
-    """Lines that give the parts of the depth between rows, ``s0`` and so on, and that behind the last, ``beyond``."""
-    lines = ["    x = depth / depth_scale"]
+def _text(name: str, depths: np.ndarray, factor: str, terms: list[str]) -> str:
+    """A function: a factor times terms in the parts of the depth, ``s0`` and so on between rows, ``beyond`` behind the last."""
+    lines = [f"def {name}(depth, depth_scale, force_scale):", "    x = depth / depth_scale"]
     for k, (low, high) in enumerate(itertools.pairwise(depths.tolist())):
         lines.append(f"    s{k} = min(max(x - {low!r}, 0.0), {high - low!r})")
-    return [*lines, f"    beyond = max(x - {depths[-1].item()!r}, 0.0)"]
+    lines.append(f"    beyond = max(x - {depths[-1].item()!r}, 0.0)")
+    return "\n".join([*lines, f"    return {factor} * ({' + '.join(terms)})", ""])
 
 
 def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
@@ -65,9 +66,7 @@ def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
         f"s{k} * ({m!r} + s{k} * ({c2!r} + s{k} * {c3!r}))"
         for k, (c3, c2, m, _) in enumerate(cubics.T.tolist())
     ]
-    total = " + ".join([*terms, f"{float(slope)!r} * beyond"])
-    head = "def elastic(depth, depth_scale, force_scale):"
-    return "\n".join([head, *_parts(depths), f"    return force_scale * ({total})", ""])
+    return _text("elastic", depths, "force_scale", [*terms, f"{float(slope)!r} * beyond"])
 
 
 def _energy(depths: np.ndarray, forces: np.ndarray, cubics: np.ndarray, slope: float) -> str:
@@ -77,9 +76,7 @@ def _energy(depths: np.ndarray, forces: np.ndarray, cubics: np.ndarray, slope: f
         for k, (f, (c3, c2, m, _)) in enumerate(cells)
     ]
     last = f"beyond * ({forces[-1].item()!r} + {float(slope) / 2!r} * beyond)"
-    total = " + ".join([*terms, last])
-    head, stored = "def energy(depth, depth_scale, force_scale):", "force_scale * depth_scale"
-    return "\n".join([head, *_parts(depths), f"    return {stored} * ({total})", ""])
+    return _text("energy", depths, "force_scale * depth_scale", [*terms, last])
 
 
 GEOMETRY = of_rows(EXAMPLE)

@@ -2,14 +2,8 @@
 
 from hpcclear.laws.hertz_contact import by_restitution
 
-
-def factor(restitution):
-    """Return a = 8 (1 - c_e)/(5 c_e)."""
-    return 1.6 * (1.0 - restitution) / restitution
-
-
 LAW = by_restitution(
-    factor,
+    lambda restitution: 1.6 * (1.0 - restitution) / restitution,
     words="Flores and others's, damping by restitution",
     source="Flores et al. 2011, doi:10.1007/s11044-010-9237-4",
     formula="8 (1 - c_e)/(5 c_e)",

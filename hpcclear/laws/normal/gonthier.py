@@ -2,14 +2,8 @@
 
 from hpcclear.laws.hertz_contact import by_restitution
 
-
-def factor(restitution):
-    """Return a = (1 - c_e^2)/c_e."""
-    return (1.0 - restitution**2) / restitution
-
-
 LAW = by_restitution(
-    factor,
+    lambda restitution: (1.0 - restitution**2) / restitution,
     words="Gonthier and others's, damping by restitution",
     source="Gonthier et al. 2004, doi:10.1023/B:MUBO.0000029392.21648.bc",
     formula="(1 - c_e^2)/c_e",

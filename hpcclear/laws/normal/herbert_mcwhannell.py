@@ -2,14 +2,8 @@
 
 from hpcclear.laws.hertz_contact import by_restitution
 
-
-def factor(restitution):
-    """Return a = 6 (1 - c_e)/((2 c_e - 1)^2 + 3)."""
-    return 6.0 * (1.0 - restitution) / ((2.0 * restitution - 1.0) ** 2 + 3.0)
-
-
 LAW = by_restitution(
-    factor,
+    lambda restitution: 6.0 * (1.0 - restitution) / ((2.0 * restitution - 1.0) ** 2 + 3.0),
     words="Herbert and McWhannell's, damping by restitution",
     source="Herbert and McWhannell 1977, doi:10.1115/1.3439270",
     formula="6 (1 - c_e)/((2 c_e - 1)^2 + 3)",

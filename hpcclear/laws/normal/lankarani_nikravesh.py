@@ -2,14 +2,8 @@
 
 from hpcclear.laws.hertz_contact import by_restitution
 
-
-def factor(restitution):
-    """Return a = 3 (1 - c_e^2)/4."""
-    return 0.75 * (1.0 - restitution**2)
-
-
 LAW = by_restitution(
-    factor,
+    lambda restitution: 0.75 * (1.0 - restitution**2),
     words="Lankarani and Nikravesh's, damping by restitution",
     source="Lankarani and Nikravesh 1990, doi:10.1115/1.2912617 (paper eq. 7)",
     formula="3 (1 - c_e^2)/4",

@@ -2,14 +2,8 @@
 
 from hpcclear.laws.hertz_contact import by_restitution
 
-
-def factor(restitution):
-    """Return a = 3 (1 - c_e)/4."""
-    return 0.75 * (1.0 - restitution)
-
-
 LAW = by_restitution(
-    factor,
+    lambda restitution: 0.75 * (1.0 - restitution),
     words="Lee and Wang's, damping by restitution",
     source="Lee and Wang 1983, doi:10.1115/1.3267402",
     formula="3 (1 - c_e)/4",
