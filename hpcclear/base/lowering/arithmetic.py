@@ -2,7 +2,8 @@
 
 import ast
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import partialmethod
 
 import numpy as np
 from llvmlite import ir
@@ -141,18 +142,14 @@ class Arithmetic:
 
     # ---- functions of Python, and those that views of memory are made with ----------------------
 
-    def _call_max(self, *values: Value) -> Value:
-        return self._extreme(ast.Gt, values)
-
-    def _call_min(self, *values: Value) -> Value:
-        return self._extreme(ast.Lt, values)
-
-    def _extreme(self, op: type[ast.cmpop], values: Iterable[Value]) -> Value:
-        first, *others = values
+    def _extreme(self, op: type[ast.cmpop], first: Value, *others: Value) -> Value:
         for one in others:
             first, one, _ = self.both(first, one)
             first = self.builder.select(self.compared(op, one, first), one, first)
         return first
+
+    _call_max, _call_min = partialmethod(_extreme, ast.Gt), partialmethod(_extreme, ast.Lt)
+    _call_float = partialmethod(cast, kind=DOUBLE)
 
     def _call_abs(self, value: Value) -> Value:
         negative = self.builder.icmp_signed("<", value, val.whole(0))
@@ -162,9 +159,6 @@ class Arithmetic:
         if value.type == DOUBLE:
             return self.builder.fptosi(value, WHOLE)
         return self.cast(value, WHOLE)
-
-    def _call_float(self, value: Value) -> Value:
-        return self.cast(value, DOUBLE)
 
     def _call_floor(self, value: Value) -> Value:
         return self._call_int(self.intrinsic("llvm.floor", [value]))
@@ -201,10 +195,10 @@ class Arithmetic:
         return self.builder.bitcast(value, DOUBLE)
 
     def _call_no_less(self, value: Value, least: Value) -> Value:
-        return self._extreme(ast.Gt, (self.cast(value, DOUBLE), least))
+        return self._call_max(self.cast(value, DOUBLE), least)
 
     def _call_no_more(self, value: Value, most: Value) -> Value:
-        return self._extreme(ast.Lt, (self.cast(value, DOUBLE), most))
+        return self._call_min(self.cast(value, DOUBLE), most)
 
     def _call_narrow_vectors(self) -> None:
         # llvmlite's own `add` lets only those pass that it knows
@@ -224,8 +218,7 @@ class Arithmetic:
         place = self._row(array, row)
         self.builder.store(self.cast(vector, VECTOR), place, align=_ALIGNED)
 
-    def _call_spread(self, number: Value) -> Value:
-        return self.cast(number, VECTOR)
+    _call_spread = partialmethod(cast, kind=VECTOR)
 
     def _call_above(self, vector: Value, yes: Value, no: Value) -> Value:
         is_above = self.builder.fcmp_ordered(">", vector, self.cast(0.0, VECTOR))
