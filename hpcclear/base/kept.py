@@ -26,6 +26,7 @@ SILENT = 10.0
 """Seconds of waiting after which that is said."""
 
 _given_up = False
+_said: list[str] = []
 
 
 def digest(content: bytes) -> bytes:
@@ -77,13 +78,7 @@ def drop(path: Path) -> None:
         return
     except OSError:
         pass  # somebody else's, or a directory: compiled anew every time
-    _say(f"Warning: the cache of compiled code in {path.parent} was damaged: compiling again")
-
-
-_said: list[str] = []
-
-
-def _say(text: str) -> None:
+    text = f"Warning: the cache of compiled code in {path.parent} was damaged: compiling again"
     if not _said:
         sys.stderr.write(f"{plain(text)}\n")
     _said.append(text)

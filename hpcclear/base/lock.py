@@ -50,8 +50,7 @@ class Holder(NamedTuple):
         except (ValueError, KeyError, TypeError, RecursionError):
             return None
         kinds = [int if name == "pid" else str for name in cls._fields]
-        fine = all(map(isinstance, holder, kinds)) and holder.pid > 0
-        return holder if fine else None
+        return holder if all(map(isinstance, holder, kinds)) and holder.pid > 0 else None
 
     def is_over(self) -> bool:
         """Whether the holder is known to be gone; False when that is not known."""

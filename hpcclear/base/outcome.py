@@ -146,8 +146,7 @@ class Field(NamedTuple):
 
 
 def _about_mean(o: Any) -> Any:
-    mean_square = (o.frame_force**2).sum(axis=1)
-    return np.sqrt(np.maximum(o.square_frame_force - mean_square, 0.0))
+    return np.sqrt(np.maximum(o.square_frame_force - (o.frame_force**2).sum(axis=1), 0.0))
 
 
 _IMPACTS = {
@@ -281,9 +280,8 @@ NUMBERS = tuple(name for name, one in FIELDS.items() if one.kind == "f8")
 def unknown(count: int, record: np.dtype = OUTCOME) -> np.ndarray:
     """Records (count,) of a `record_type`: numbers NaN, codes 0."""
     records = np.zeros(count, record)
-    for name in record.names or ():
-        if name in NUMBERS:
-            records[name] = np.nan
+    for name in {*NUMBERS} & {*(record.names or ())}:
+        records[name] = np.nan
     return records
 
 

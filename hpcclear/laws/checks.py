@@ -35,12 +35,8 @@ SAME = 1e-4  # relative, of slopes by differences
 
 _PAIRS = {
     "contact": ("factor", "elastic", "factor multiplies the elastic part of the force"),
-    "friction": (
-        "deflection",
-        "largest",
-        "the largest deflection, m, sets the tolerance of bristles",
-    ),
-}
+    "friction": ("deflection", "largest", "the largest deflection, m, sets the tolerance of bristles"),
+}  # fmt: skip
 """What a law declares, what belongs to it, and why."""
 
 
@@ -169,8 +165,7 @@ def unit_of(unit: str, name: str) -> Quantity:
             one = registry().Quantity(float(scale), registry().UnitsContainer(powers))
             made = made * one ** float(power)
     except ValueError:
-        reason = f"the unit {unit!r} of {name} is not known"
-        raise LawError(reason, "Write, say, s/m") from None
+        raise LawError(f"the unit {unit!r} of {name} is not known", "Write, say, s/m") from None
     return made
 
 

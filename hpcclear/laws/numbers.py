@@ -160,8 +160,7 @@ def swing(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Array
     """Stiffness dF/dd where the elastic part is `force` (m,), N/m."""
     if law.swing is not None:
         return evaluate(law.swing, {**numbers, "force": force})
-    depth = depth_at(law, force, numbers)
-    return _slope(law, depth, numbers)
+    return _slope(law, depth_at(law, force, numbers), numbers)
 
 
 def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Array:

@@ -36,8 +36,7 @@ def text_of(law: Law) -> str:
     """The text of a law; raises LawError if a function has more in it than arithmetic."""
     law = with_constants(law)
     parts = [HEAD.format(title=f"The {law.kind} law {law.name}")]
-    functions = law.functions()
-    for name, function in functions.items():
+    for name, function in law.functions().items():
         parts += written(function, f"own_{name}", f"{law.name}.{name}")
     for name, formula in (_contact if isinstance(law, ContactLaw) else _friction)(law).items():
         head = f"@lane_function\ndef joint_{name}({_SIGNATURES[law.kind]}):"

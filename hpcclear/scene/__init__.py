@@ -14,8 +14,7 @@ __all__ = ["Scene", "differences", "load_scene", "scene_schema"]
 def __getattr__(name: str) -> object:
     if name != "scene_schema":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from hpcclear.scene.schema import (
-        scene_schema,  # with the readers of files, whose entries it has
-    )
+    # with the readers of files, whose entries it has
+    from hpcclear.scene.schema import scene_schema
 
     return scene_schema

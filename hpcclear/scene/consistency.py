@@ -104,8 +104,8 @@ class ConsistentTables(SceneTables):
 
     def _check_effects(self) -> None:
         clearance = self.clearance_joints()
-        contact = self.effects.contact
-        if contact is not None and contact.has_length:
+        contact, shape = self.effects.contact, self.effects.geometry
+        if contact is not None and shape is not None and shape.has_length:
             for name in clearance:
                 if self.clearance_joint(name).length_path is None:
                     entry, part = self.clearance_joint(name).long_entry

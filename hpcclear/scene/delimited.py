@@ -83,9 +83,8 @@ def _decoded(path: Path, what: str, data: bytes) -> tuple[str, str]:
     """Text of a file, and its encoding in words."""
     nulls = data[:2000].count(0)
     codec = encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
-    if (
-        not encoding and nulls and nulls * 4 >= min(len(data), 2000)
-    ):  # every other byte of Latin letters
+    # every other byte of Latin letters
+    if not encoding and nulls and nulls * 4 >= min(len(data), 2000):
         codec, encoding = ("UTF-16-LE" if data[1:2] == b"\0" else "UTF-16-BE"), "UTF-16"
     encoding = encoding or "UTF-8"
     codec = "utf-8-sig" if encoding == "UTF-8" else codec

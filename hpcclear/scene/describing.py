@@ -95,10 +95,9 @@ def _rod(scene: SceneTables) -> Iterator[str]:
     buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
     if inertia > 0.5 * buckling:
         key = "mechanism.rod.bending.stiffness"
-        load = (
-            f"the inertia of rod and slider comes to {inertia:.3g} N; deflections are large there"
-        )
-        yield f"{key} = {scene.shown(key)} buckles under {buckling:.3g} N, and {load}"
+        size = f"{key} = {scene.shown(key)} buckles under {buckling:.3g} N"
+        load = f"the inertia of rod and slider comes to {inertia:.3g} N"
+        yield f"{size}, and {load}; deflections are large there"
 
 
 def _joints(scene: SceneTables) -> Iterator[str]:

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 from pydantic import field_validator
 
 from hpcclear.base.pieces import Rows
-from hpcclear.laws.declared import ContactLaw, FrictionLaw
+from hpcclear.laws.declared import ContactLaw, FrictionLaw, Geometry
 from hpcclear.scene.curves import Curve, Pairs, by_angle
 from hpcclear.scene.fields import Entries, Quantity, Speed, Table, invalid
 from hpcclear.scene.joints import JointFriction
@@ -48,12 +48,6 @@ class ContactTable(LawTable):
             raise invalid('belongs to geometry = "table"', "Write geometry, or remove it", "curve")
 
     @property
-    def has_length(self) -> bool:
-        """Whether the length of each bearing is needed."""
-        shape = self.declared.geometry
-        return shape is not None and shape.has_length
-
-    @property
     def latched(self) -> bool:
         """Whether the law remembers the approach speed of each impact."""
         return self.declared.latched
@@ -77,11 +71,6 @@ class FrictionTable(LawTable):
         assert isinstance(self._law, FrictionLaw)
         return self._law
 
-    @property
-    def bristled(self) -> bool:
-        """Whether the law has a state of its own in each joint."""
-        return bool(self.declared.bristled)
-
 
 class EffectTables(Table):
     """Effects that act on the mechanism. Disabled effects are not computed."""
@@ -99,10 +88,14 @@ class EffectTables(Table):
     """Friction of the slider in its guide; default "none"."""
 
     @property
+    def geometry(self) -> Geometry | None:
+        """The shapes that touch; None where a law has its own, or there is no contact."""
+        return None if self.contact is None else self.contact.declared.geometry
+
+    @property
     def has_pressure(self) -> bool:
         """Whether the geometry of contacts has a pressure."""
-        shape = None if self.contact is None else self.contact.declared.geometry
-        return shape is not None and shape.pressure is not None
+        return self.geometry is not None and self.geometry.pressure is not None
 
     def law_unit(self, path: str) -> str | None:
         """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""

@@ -14,9 +14,10 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.plain import counted
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
+from hpcclear.scene import fields
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.faults import explained
-from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, Tables, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, Tables, invalid, table_at
 from hpcclear.scene.paths import curve_at, curves, files_named, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 
@@ -48,7 +49,7 @@ class FileCurve(Table):
     """Unit or heading of forces."""
     torque: str | None = None
     """Unit or heading of torques."""
-    bore: PositiveLength | None = None
+    bore: fields.PositiveLength | None = None
     """Diameter of the piston, m."""
     area: Annotated[float, Quantity("m**2", above=0)] | None = None
     """Instead of `bore`: area on which the pressure acts, m2."""
@@ -286,8 +287,6 @@ def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
 
 def _turns(content: Tables) -> int:
     """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
-    mechanism = content.get("mechanism")
-    drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None
-    rows = [content.get("drive"), *(drives.values() if isinstance(drives, Mapping) else ())]
+    rows = [content.get("drive"), *table_at(content, "mechanism.drives").values()]
     turns = [row.get("turns", 1) for row in rows if isinstance(row, Mapping)]
     return max((one for one in turns if type(one) is int), default=1)

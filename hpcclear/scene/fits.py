@@ -190,8 +190,7 @@ class Tolerance(Table):
             raise invalid("belongs to a normal distribution", "Remove it", "cp")
         if self.cpk is not None and self.cpk > self.cp:
             raise invalid("is larger than cp", "Write cpk no larger than cp", "cpk")
-        off = self.cpk is not None and self.cpk < self.cp
-        if off and self.towards is None:
+        if self.cpk is not None and self.cpk < self.cp and self.towards is None:
             reason = "the mean lies off the middle, and nothing says where"
             raise invalid(reason, 'Add towards = "upper" or "lower"', "towards")
 
@@ -238,9 +237,7 @@ def with_clearance(joint: Entries) -> Content:
         with at("fit", joint["fit"]):
             fit = fit_of(joint["fit"])
         made |= {"clearance": fit.clearance, "bearing_radius": fit.bearing_radius}
-        low, middle, high = (
-            1e6 * one for one in (fit.clearances[0], fit.clearance, fit.clearances[1])
-        )
+        (low, high), middle = (1e6 * one for one in fit.clearances), 1e6 * fit.clearance
         clearance = f"a radial clearance of {low:.4g} to {high:.4g} um, here {middle:.4g} um"
         radius = f"a bearing radius of {1e3 * fit.bearing_radius:.8g} mm"
         note(joint["fit"], f"{clearance}, and {radius}")

@@ -82,12 +82,12 @@ def _all_entries() -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:
 @lru_cache(maxsize=1)
 def curves() -> Mapping[str, Pairs]:
     """Tables of pairs that may come from a file, by path, such as "mechanism.drives.*.torque"."""
-    found = {}
-    for path, field, _ in _all_entries():
-        for part in (*field.metadata, *_parts(field.annotation)):
-            if isinstance(part, Pairs) and part.most > MOST_ROWS:
-                found[path] = part
-    return found
+    return {
+        path: part
+        for path, field, _ in _all_entries()
+        for part in (*field.metadata, *_parts(field.annotation))
+        if isinstance(part, Pairs) and part.most > MOST_ROWS
+    }
 
 
 def curve_at(path: str) -> Pairs | None:

@@ -119,8 +119,7 @@ def snapped(study: Study, names: Sequence[str], coordinates: Array, model: bool 
 def nearest_of(options: Sequence[float], values: Array) -> Array:
     """The nearest of some rising numbers, SI, (n,)."""
     table = np.asarray(options)
-    middles = (table[1:] + table[:-1]) / 2.0
-    return np.asarray(table[np.searchsorted(middles, values)])
+    return np.asarray(table[np.searchsorted((table[1:] + table[:-1]) / 2.0, values)])
 
 
 def expanded(study: Study | None, points: Points) -> Points:

@@ -41,8 +41,7 @@ class Switch:
 
     def path(self, path: str) -> str | None:
         """Where a number of the scene stands with the effect off; None if nowhere."""
-        gone = any(_holds(key, path) for key in self.changes)
-        return self.moved.get(path) if gone else path
+        return self.moved.get(path) if any(_holds(key, path) for key in self.changes) else path
 
     @property
     def stiff(self) -> bool:

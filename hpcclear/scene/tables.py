@@ -127,7 +127,7 @@ class SceneTables(Table):
     @property
     def bristles(self) -> int:
         """Contacts whose friction has bristles, each with a state of its own."""
-        return len(self.contact_labels()) if self.effects.friction.bristled else 0
+        return len(self.contact_labels()) if self.effects.friction.declared.bristled else 0
 
     def bending(self) -> dict[str, BarBending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
@@ -148,8 +148,7 @@ class SceneTables(Table):
     @property
     def has_thresholds(self) -> bool:
         """Whether some joint wears from a pressure on only."""
-        worn = [joint.wear for joint in self._loose.values()]
-        return any(wear is not None and wear.threshold is not None for wear in worn)
+        return any(getattr(one.wear, "threshold", None) is not None for one in self._loose.values())
 
     def waves(self) -> dict[str, int]:
         """How many waves bearings and journals have around them at most: in the scene, or as wear makes them."""

@@ -111,15 +111,13 @@ class StudyVariable(NamedInput):
             return row | {"ratio": Quantity("", above=0).range(row["ratio"], "ratio")}
         known = [quantities()[path] for path in paths] or [_of_input(row)]
         if kind == "range":
-            given = row["range"]
-            for one in reversed(known):
-                row["range"] = one.range(given, "range")
+            row["range"] = [one.range(row["range"], "range") for one in reversed(known)][-1]
             if "step" in row:
                 row["step"] = Quantity(known[0].unit, above=0).convert(row["step"], "step")
                 choices.grid(row["range"][0], row["range"][1], row["step"])
         else:
-            for one in reversed(known):
-                found = one.several(row["values"], "values", 2, choices.MOST)
+            read = [one.several(row["values"], "values", 2, choices.MOST) for one in known[::-1]]
+            found = read[-1]
             if len(set(found)) < len(found):
                 raise invalid("a value stands there twice", "Remove one", "values")
             row["values"] = tuple(sorted(found))

@@ -63,8 +63,7 @@ class Expressions(Arithmetic):
         return getattr(self.expression(node.value), node.attr)
 
     def _of_BinOp(self, node: ast.BinOp) -> Value:
-        one = self.expression(node.left)
-        return self.binary(type(node.op), one, self.expression(node.right))
+        return self.binary(type(node.op), self.expression(node.left), self.expression(node.right))
 
     def _of_UnaryOp(self, node: ast.UnaryOp) -> Value:
         value = self.expression(node.operand)

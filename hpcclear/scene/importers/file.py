@@ -9,10 +9,9 @@ from typing import NamedTuple, NoReturn
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import to_si
+from hpcclear.scene.named import NAME
 
 GROUND = "ground"
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
-"""Of a point or a body."""
 MOST_POINTS = 1000
 """Of a linkage: points are compared in pairs, and a file of more holds something else."""
 LONGEST_NUMBER = 100

@@ -133,8 +133,7 @@ def summary(content: Content, drawing: Drawing) -> list[tuple[str, str]]:
         for body, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)
     ]  # fmt: skip
     for size, body, first, second in sorted(lengths)[-1:]:
-        text = f"at most {1e3 * size:.6g} mm, from {first} to {second} of {body}"
-        lines.append(("length", text))
+        lines.append(("length", f"at most {1e3 * size:.6g} mm, from {first} to {second} of {body}"))
     return lines + [("note", note) for note in drawing.notes]
 
 
