@@ -190,10 +190,7 @@ def number_of(node: ast.expr) -> float | None:
 
 
 def constant_of(node: ast.expr, named: Callable[[str], object]) -> float | None:
-    """The value of a part made of numbers, and of names that `named` knows a number for; None for any other.
-
-    Raises FormulaError if it has no finite value.
-    """
+    """The value of a part of numbers, and names that `named` knows, else None. Raises FormulaError where it is not finite."""
     match node:
         case ast.BinOp(left=left, right=right) if type(node.op) in _SIGNS:
             sides = [constant_of(one, named) for one in (left, right)]
@@ -216,12 +213,7 @@ def constant(value: float) -> ast.expr:
 
 
 def fold(node: ast.BinOp, written: ast.expr | None = None) -> ast.expr:
-    """The number that an operation on two numbers gives; the operation itself where one of them is none.
-
-    `written`: the part as messages show it.
-
-    Raises FormulaError if it has no finite value.
-    """
+    """The number of an operation on two numbers, else the operation. Raises FormulaError of `written` if it is not finite."""
     if type(node.op) not in _SIGNS:
         raise FormulaError(f"contains more than arithmetic: {_shown(node)}")
     left, right = number_of(node.left), number_of(node.right)

@@ -111,10 +111,7 @@ class Objective:
         return {"mean": mean, "rms": np.sqrt(np.maximum(mean, 0.0)), "peak": peak}[self.made]
 
     def of(self, records: Records) -> Array:
-        """Its value of records (n,), NaN where something that it is made of is, or was not recorded.
-
-        Raises InputError where `value` raised something, or gives no number.
-        """
+        """Its value of records (n,), NaN where a part is or is missing. Raises InputError where `value` gives no number."""
         names = ("rate",) if self.value is None else arguments(self.value)
         found = np.full(len(records), np.nan)
         fields = {RATE if name == "rate" else name for name in names}

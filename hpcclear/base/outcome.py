@@ -23,10 +23,7 @@ WAVE_ROWS = 32
 
 
 class Status(IntEnum):
-    """Outcome of one simulation. Numbers are NaN unless it is `valid`.
-
-    `message`: what happened, `remedy`: what to change, a sentence each.
-    """
+    """Outcome of one simulation, with `message` and `remedy`, a sentence each. Numbers are NaN unless it is `valid`."""
 
     message: str
     remedy: str
@@ -293,10 +290,7 @@ def failed(sample: int, status: Status, work: int = 0, record: np.dtype = OUTCOM
 
 
 def recast(records: np.ndarray, record: np.dtype) -> np.ndarray:
-    """Records (n,) in another `record_type`, without fields and joints that it lacks; those that it adds are unknown.
-
-    The records themselves if they are of this type already.
-    """
+    """Records (n,) in another `record_type`, unchanged if in it already: fields and joints that it adds are unknown."""
     if records.dtype == record:
         return records
     found = unknown(len(records), record)

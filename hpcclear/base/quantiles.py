@@ -21,9 +21,7 @@ TAIL = 6.0
 
 
 def truncated_quantile(chance: Array, low: float, high: float) -> Array:
-    """Quantiles of the standard normal truncated at two bounds, low < 0 < high, by inversion; of probabilities of any shape.
-    All in standard deviations.
-    """
+    """Quantiles, of any shape, of the standard normal truncated at low < 0 < high, all in standard deviations."""
     from scipy.special import ndtr, ndtri  # a quarter of a second that a Latin hypercube saves
 
     below = ndtr(low)

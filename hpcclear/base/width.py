@@ -20,10 +20,7 @@ _PREFERENCE = {128: "+prefer-128-bit", 256: "+prefer-256-bit", 512: "-prefer-256
 
 
 def asked_width() -> int | None:
-    """The width that ``HPCCLEAR_VECTOR_BITS`` names; None where it is not set.
-
-    Raises InputError if it is set to anything but 128, 256 or 512.
-    """
+    """The width that ``HPCCLEAR_VECTOR_BITS`` names; None where it is not set. Raises InputError if it is none of `WIDTHS`."""
     asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
     if asked not in ("", *map(str, WIDTHS)):
         raise InputError(
@@ -34,10 +31,7 @@ def asked_width() -> int | None:
 
 
 def features() -> str | None:
-    """The processor's features as they are passed to Numba; None where there is nothing to choose.
-
-    Raises InputError as `asked_width`.
-    """
+    """The processor's features for Numba; None where there is nothing to choose. Raises InputError as `asked_width`."""
     asked = asked_width()
     known = llvm.get_host_cpu_features()
     if asked != 128 and not known.get("avx512f", False):

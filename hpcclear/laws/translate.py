@@ -43,10 +43,7 @@ def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
 
 
 def written(function: Callable[..., object], name: str, title: str) -> list[str]:
-    """Texts of a function, called `name`, and of those it calls, which come first.
-
-    Raises LawError if it has more in it than arithmetic.
-    """
+    """Texts of a function, called `name`, and before it of those it calls. Raises LawError if it has more than arithmetic."""
     try:
         return _Writer(title).function(function, name)
     except RecursionError:

@@ -36,10 +36,7 @@ _trusted: ContextVar[bool] = ContextVar("trusted", default=False)
 
 @contextlib.contextmanager
 def using(texts: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """In this block ``"module:Name"`` is found in these source texts, by module.
-
-    Yields versions of the packages whose plug-ins were taken meanwhile, by package.
-    """
+    """In this block ``"module:Name"`` is found in these texts. Yields versions, by package, of plug-ins taken."""
     packages: dict[str, str] = {}
     with holding(_reading, _Reading(texts, packages)):
         yield packages

@@ -121,10 +121,7 @@ def _span(scene: SceneTables, path: str, names: tuple[str, ...]) -> Range:
 
 
 def to_physical(scene: SceneTables, names: Sequence[str], coordinates: Array) -> Array:
-    """Sampling coordinates to SI values: ratios become inertias by mass and length of the same row.
-
-    Both arrays have shape ``(n, d)``, a column a name.
-    """
+    """Sampling coordinates (n, d), a column a name, to SI: ratios become inertias by mass and length of the same row."""
     return _scaled(scene, names, coordinates, inverse=False)
 
 

@@ -233,10 +233,7 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
 
 
 def with_values(content: Tables, folder: Path) -> tuple[Tables, list[Reading]]:
-    """The parsed content of a scene with what files in `folder` hold in the place of their names, and how each was read.
-
-    Raises InputError if a file cannot be read, has no such column or a cell in it is no number.
-    """
+    """A parsed scene with what its files in `folder` hold, and how each was read. Raises InputError if one cannot be read."""
     read_as: list[Reading] = []
     for key, row in files_named(content).items():
         file = row["file"]

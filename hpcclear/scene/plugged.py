@@ -92,10 +92,7 @@ def modules_named(content: object) -> set[str]:
 
 
 def with_texts(content: Tables, read: Callable[[str], str | None]) -> dict[str, object]:
-    """The content with the texts of the modules that it names.
-
-    `read` gives a module's text, None where there is no such file: whatever wants it says so.
-    """
+    """The content with the texts of the modules that it names; `read` gives a text, None where there is no such file."""
     texts = {module: read(module) for module in sorted(modules_named(content))}
     rows = {module: {"source": text} for module, text in texts.items() if text is not None}
     return {**content, **({"plugins": {"files": rows}} if rows else {})}

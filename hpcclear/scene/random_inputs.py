@@ -314,10 +314,7 @@ class RandomInput(NamedInput):
 
     @cached_property
     def law(self) -> quantiles.Quantiles:
-        """Its quantile function: of its value where it is absolute, else of its difference from the design, SI.
-
-        Raises InputError: only a wear simulation gives its values.
-        """
+        """Its distribution, SI: of its value if `absolute`, else of its difference from the design. InputError if `worn`."""
         return self.changed({})
 
     def changed(self, entries: Mapping[str, object]) -> quantiles.Quantiles:

@@ -364,10 +364,7 @@ def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts
 
 
 def record_of(scene: Scene, mapped: bool = False) -> np.dtype:
-    """Type of the record of a sample of a scene: its contacts and bands, and fields of what it requests.
-
-    `mapped`: the motion of each sample is judged, as in a map; by default only with a target error.
-    """
+    """Type of the record of a sample; `mapped`: its motion is judged, as in a map, by default only with a target error."""
     judged = mapped or (scene.numerics.target_error is not None and scene.clearance_joints())
     asked = {
         "response": scene.responses_asked(),

@@ -100,10 +100,7 @@ def _with_files(schema: JsonSchemaValue) -> JsonSchemaValue:
 
 
 def scene_schema() -> JsonSchemaValue:
-    """JSON schema (draft 2020-12) of the scene file.
-
-    It says which keys and kinds of values there are; what makes a mechanism is checked by `load_scene` alone.
-    """
+    """JSON schema (draft 2020-12) of scene files: keys and kinds of values. Only `load_scene` checks what makes a mechanism."""
     schema = _with_files(Scene.model_json_schema())
     definitions = schema["$defs"]
     definitions["FileCurve"] = FileCurve.model_json_schema()

@@ -54,10 +54,7 @@ class Sheet:
     """Whether decimals have a comma."""
 
     def number(self, column: SheetColumn, row: int, unit: str = "", size: Fraction = _ONE) -> float:
-        """A cell in SI: `size` times its number, or by the unit that stands with the number in the cell.
-
-        Raises InputError if there is none; it names line and column.
-        """
+        """A cell in SI: `size` times its number, or by its own unit. Raises InputError with line and column if it is none."""
         cell = column.cells[row]
         text = cell.strip()
         comma, stored = self._signs(cell)
@@ -127,10 +124,7 @@ class Sheet:
         return np.array([self.number(column, row, unit, size) for row in range(len(self.lines))])
 
     def entries(self, column: SheetColumn) -> list[float | str]:
-        """The cells of a column as entries of a scene: numbers, or texts with the unit of its heading or their own.
-
-        Raises InputError if a cell holds no number.
-        """
+        """Cells of a column as entries of a scene: numbers, or texts with a unit. Raises InputError if one is no number."""
         if column.unit or not all(map(self._has_unit, column.cells)):
             values = self.si(column, column.unit, "").tolist()
             return [units.written(value, column.unit) for value in values]

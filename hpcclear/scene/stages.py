@@ -159,10 +159,7 @@ MOMENTS = ("mean", "deviation")
 
 
 def of_both(entry: object) -> object:
-    """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
-
-    An error for validators where it is no number between 0 and 1.
-    """
+    """The accuracy of mean and deviation, of one number for both; an error for validators where it is not between 0 and 1."""
     if entry is None:
         return None
     if not isinstance(entry, Mapping):

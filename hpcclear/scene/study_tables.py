@@ -189,11 +189,7 @@ class StudyTables(Table):
         return bool(row.relative or self._drivers[row.name])
 
     def law(self, row: RandomInput, design: Mapping[str, float]) -> quantiles.Quantiles:
-        """Distribution of a random input at a design (SI, by name): of its value where it is absolute, else of its difference
-        from the design. What the design leaves out is as in the scene.
-
-        Raises InputError: only a wear simulation gives its values.
-        """
+        """`RandomInput.law` of a random input at a design (SI, by name); what the design leaves out is as in the scene."""
         if not self.moves(row):
             return row.law
         entries: dict[str, object] = {}

@@ -29,10 +29,7 @@ class Film(Table):
 
 
 def check_film(film: Film | None, clearance: float, radius: float) -> None:
-    """An error for validators unless a film is left between rough surfaces in the middle of a clearance, m, and its model fits.
-
-    `radius`: of the bearing, m.
-    """
+    """An error for validators unless rough surfaces leave a film in the clearance, m, and its model fits the bearing."""
     if film is None:
         return
     ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths

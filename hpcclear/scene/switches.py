@@ -61,10 +61,7 @@ def _holds(key: str, path: str) -> bool:
 
 
 def switches(scene: Scene) -> tuple[Switch, ...]:
-    """All effects of a scene that may be switched off, joints first.
-
-    Clearance in a joint of ``numerics.objective_joints`` is left out, since it makes up the objective.
-    """
+    """All effects that may be switched off, joints first; not the clearances of ``numerics.objective_joints``."""
     return (
         *_clearances(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
         *_bendings(scene), *_outside(scene), *_drives(scene),

@@ -162,10 +162,7 @@ def file_text(path: Path, what: str, remedy: str) -> str:
 
 
 def parse(text: str, name: str) -> dict[str, object]:
-    """The tables of a TOML text, whatever it holds; `name` says in errors where it stands.
-
-    Raises InputError if it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
-    """
+    """The tables of a TOML text, which stands at `name`. Raises InputError where it is none, too long or nested too deeply."""
     where = "scene file", name
     if len(text) > LARGEST_FILE:
         raise InputError(*where, f"is larger than {LARGEST_FILE} bytes", _SHORTER)

@@ -51,10 +51,7 @@ class _Code(NamedTuple):
 
 
 class _Program:
-    """The functions that one function is made of, each optimised on its own, then linked into those that call it.
-
-    What a function of its own is looked at before it is inlined: see `hpcclear.base.jit.apart`.
-    """
+    """The functions that one function is made of: each optimised on its own (`jit.apart`), then linked into its callers."""
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -77,10 +77,7 @@ def forces(eccentricity: float, ratio: float, angles: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def correction(ratio: float) -> Array:
-    """Coefficients of P along w, then across, each in powers of s, in powers of the sine; shape (layout.FURTHER_ROWS,).
-
-    `ratio`: length over diameter.
-    """
+    """Coefficients (layout.FURTHER_ROWS,) of P along w, then across, by powers of s, then of the sine; `ratio` as above."""
     k = np.arange(_NODES[0])
     s = 0.5 * (1.0 + LEAST_S) + 0.5 * (1.0 - LEAST_S) * np.cos((k + 0.5) * np.pi / len(k))
     inner = (np.arange(_NODES[1]) + 0.5) * np.pi / _NODES[1]

@@ -227,10 +227,7 @@ def _add(body: _Body, one: _Entity, file: File) -> None:
 
 
 def _distinct(every: list[Place], size: float, file: File) -> tuple[list[Place], dict[Place, int]]:
-    """Each place once, and which of them each is; places that are neither one nor two are refused.
-
-    Places are kept in squares, so that those beside one are found without a look at all.
-    """
+    """Each place once, found by squares, and which of them each is; places that are neither one nor two are refused."""
     made, at = list[Place](), dict[Place, int]()
     squares: dict[tuple[int, int], list[int]] = {}
     side = _NEAR * size or 1.0

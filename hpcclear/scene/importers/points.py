@@ -55,10 +55,7 @@ class Drawing(NamedTuple):
 
 
 def scene_of(drawing: Drawing, key: str) -> Content:
-    """The tables of a scene whose linkage has its points where a drawing has them; `key`: the file, in errors.
-
-    Raises InputError if the bodies make no linkage.
-    """
+    """The tables of a scene with the points of a drawing. Raises InputError of the file `key` if they make no linkage."""
     points = _with_blocks(_checked(drawing.points, key), key)
     own = _by_body(points)
     names = [name for name in own if name != GROUND]
