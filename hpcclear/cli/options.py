@@ -179,10 +179,7 @@ Run = Callable[..., int | None]
 
 
 def command(group: str, words: str, ranks: bool = False) -> Callable[[Run], Command]:
-    """Make a command of a function; its name is that of the function's file.
-
-    `words`: its line in the list of commands. Other arguments: see `Command`.
-    """
+    """Make a command of a function, called as its file; `words`: its line in the list of commands. Others: see `Command`."""
 
     def declared(function: Run) -> Command:
         name = function.__module__.rpartition(".")[2]

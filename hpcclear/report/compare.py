@@ -54,10 +54,7 @@ class ComparedSignal:
 
     @property
     def norms(self) -> dict[str, float]:
-        """RMS and largest error, that of mean and of peak (simulated less measured, SI), and the correlation coefficient.
-
-        All of them at the measured points alone: a peak of the simulation between these counts for nothing.
-        """
+        """RMS and largest error, errors of mean and peak (simulated less measured), SI, and correlation: at measured points."""
         difference = self.simulated - self.measured
         peaks = [float(np.abs(one).max()) for one in (self.simulated, self.measured)]
         off, own = (float(np.sqrt(np.mean(x**2))) for x in (difference, self.measured))

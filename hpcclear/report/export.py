@@ -48,8 +48,7 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
 
 
 def read_samples(paths: Sequence[str | Path]) -> dict[str, Results]:
-    """Return the samples of several result files, by the names of these; those of run times are passed over. Raises
-    InputError if a file cannot be read or holds no samples."""
+    """Return the samples of several files by their names, without run times. Raises InputError if a file holds no samples."""
     found: dict[str, Results] = {}
     for path in map(Path, paths):
         if path.name.endswith(".timing.nc"):

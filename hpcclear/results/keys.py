@@ -18,11 +18,7 @@ def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
 
 
 def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
-    """Refuse results of another run than the one that `key` names: by scene, version, seed and so on.
-
-    Flattened entries of a scene make the message name the entries that changed; `place`: of the results, for the message.
-    Raises InputError: the keys differ; the message lists where.
-    """
+    """Raise InputError where results at a place are of another run than `key` names; it lists the entries that differ."""
     found = key_of(content)
     pairs = {name: (found.get(name), key.get(name)) for name in sorted({*found, *key})}
     shown = [f"{name}: {_apart(*pair)}" for name, pair in pairs.items() if pair[0] != pair[1]]

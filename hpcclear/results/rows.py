@@ -155,9 +155,7 @@ def outcome(*per_sample: str) -> FileVariables:
 def estimate(
     name: str, dims: str, units: str, words: str, true: str = "", level: str = "", *, required: bool = False
 ) -> FileVariables:  # fmt: skip
-    """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper.
-
-    `required`: the number itself."""
+    """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper."""
     found = {f"{name}{true}": number(dims, units, words, required=required)}
     for end in ("lower", "upper"):
         of_end = f"{words}: {end} end of its {level}confidence interval"

@@ -55,8 +55,7 @@ class Content:
 
 
 def read(*places: str | Path) -> Content:
-    """Read every result file of a directory and of its folder ``responses``, or the files that are named. Raises InputError
-    if there is no such directory or no result in it, or a file that is named is no result."""
+    """Read the result files of a directory and of its ``responses``, or named files. Raises InputError where there are none."""
     chosen = [Path(place) for place in places]
     whole = len(chosen) == 1 and not chosen[0].is_file()
     place = chosen[0] if whole else chosen[0].parent

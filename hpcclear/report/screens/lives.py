@@ -176,8 +176,7 @@ def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
 
 
 def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str]]:
-    """Return median, 5th and 95th percentile of lives in words, each with the ends of its confidence interval; lives that
-    failed may be of any length."""
+    """Return median, 5th and 95th percentile of lives in words, each with its interval; failed lives may be of any length."""
     every = lives[name].values
     known = every[~np.isnan(every)]
 
