@@ -34,6 +34,7 @@ from target_error import random_linkage, random_scene
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
+from hpcclear.base.verdict import Verdict, together
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.ensemble.certificate import Certificate, VariantRequest
 from hpcclear.ensemble.trial import CONFIDENCE, Trial, Wanted
@@ -242,8 +243,8 @@ def summary(rows: list[dict]) -> None:
     for row in rows:
         changes = [Change(*row[name]) for name in ("mean", "deviation") if name in row]
         within += all(abs(c.value) <= row["tolerance"] for c in changes)
-        surely += all(c.within(row["tolerance"]) for c in changes)
-        beyond += any(c.beyond(row["tolerance"]) for c in changes)
+        verdict = together([c.verdict(row["tolerance"]) for c in changes])
+        surely, beyond = surely + (verdict is Verdict.HOLDS), beyond + (verdict is Verdict.FAILS)
     times = np.array([row["times"] for row in rows])
     some = times[[bool(row["off"]) for row in rows]]
     print(f"scenes {len(rows)}; of {len(some)} something was left out")

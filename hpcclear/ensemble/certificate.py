@@ -20,9 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.verdict import Verdict
-from hpcclear.statistics.random.paired import Change, deviation_change, mean_change, point_change
+from hpcclear.base.arrays import Array, Booleans, Integers
+from hpcclear.base.verdict import Verdict, together
+from hpcclear.statistics.random import paired
+from hpcclear.statistics.random.paired import Change
 
 Variant = tuple[int, ...]
 """Effects that are off, ascending; () is the whole scene."""
@@ -88,6 +89,11 @@ class Screening:
     budget: float = np.inf
     """Replicates of the whole scene that all may come to, by work; first looks are always taken."""
 
+    @property
+    def counted(self) -> Booleans:
+        """Whether mean, standard deviation and peak force count."""
+        return np.array([True, self.scattered, self.forces])
+
 
 class Changes(NamedTuple):
     """Of one variant: changes of mean and standard deviation of the objective and of the peak force, and of single points."""
@@ -126,26 +132,19 @@ class Book:
 
     def changes(self, off: Variant) -> Changes:
         """By how much a variant differs from the whole scene, over the replicates of both."""
-        here = self.all(off)
-        count = len(here.objective)
-        whole = self.all(())
-        objective, force = whole.objective[:count], whole.force[:count]
-        level = self.plan.confidence
-        nothing = Change(np.nan, np.nan)
+        here, whole, level = self.all(off), self.all(()), self.plan.confidence
+        both = whole.objective[: len(here.objective)], here.objective
         return Changes(
-            mean_change(objective, here.objective, level),
-            deviation_change(objective, here.objective, level) if self.plan.scattered else nothing,
-            mean_change(*_largest(force, here.force), level),
-            point_change(objective, here.objective),
+            paired.mean_change(*both, level),
+            paired.deviation_change(*both, level) if self.plan.scattered else paired.UNKNOWN,
+            paired.mean_change(*_largest(whole.force[: len(here.force)], here.force), level),
+            paired.point_change(*both),
         )
 
     def verdict(self, off: Variant) -> Verdict:
         """Whether the changes that count are within the tolerance."""
-        found = self.changes(off)
-        counted = [found.mean]
-        counted += [found.deviation] if self.plan.scattered else []
-        counted += [found.force] if self.plan.forces else []
-        return judged(counted, self.plan.tolerance)
+        counted = itertools.compress(self.changes(off)[:3], self.plan.counted)
+        return together([one.verdict(self.plan.tolerance) for one in counted])
 
     def work(self, off: Variant) -> float:
         """Mean work of a sample, over that of the whole scene."""
@@ -154,13 +153,6 @@ class Book:
     def spent(self) -> float:
         """Replicates of the whole scene that all so far come to, by work."""
         return sum(self.replicates(one) * self.work(one) for one in self.seen)
-
-
-def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
-    """Within the tolerance if all are, beyond it if any is; NaN is undecided."""
-    if any(change.beyond(tolerance) for change in changes):
-        return Verdict.FAILS
-    return Verdict.HOLDS if all(c.within(tolerance) for c in changes) else Verdict.UNDECIDED
 
 
 def _largest(on: Array, off: Array) -> tuple[Array, Array]:
@@ -261,8 +253,7 @@ def _may_pass(book: Book, chosen: Variant) -> bool:
     for pair in itertools.combinations(chosen, 2):
         if pair in book.seen:
             total += interaction(book, pair)
-    counted = np.array([True, book.plan.scattered, book.plan.forces])
-    return bool((np.abs(total[counted]) <= book.plan.tolerance).all())
+    return bool((np.abs(total[book.plan.counted]) <= book.plan.tolerance).all())
 
 
 def _recommended(book: Book) -> Variant:
@@ -282,5 +273,4 @@ def interaction(book: Book, off: Variant) -> Array:
 
 
 def _values(book: Book, off: Variant) -> Array:
-    found = book.changes(off)
-    return np.array([found.mean.value, found.deviation.value, found.force.value])
+    return np.array([one.value for one in book.changes(off)[:3]])

@@ -13,7 +13,7 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.setup.problem import coordinate_count
-from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult, judged
+from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import Finished, Options, Session, sample_points, saving
 from hpcclear.ensemble.simulate import Payload
@@ -101,11 +101,10 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     whole = book.all(())
     _refuse_zero(trial.scene, whole)
     changes = [book.changes(off) for off in variants]
-    counted = np.array([True, plan.scattered, plan.forces])
     reduced = trial.variant(found.recommended).scene
-    three = [(one.mean, one.deviation, one.force) for one in changes]
+    three = [one[:3] for one in changes]
     seen = [book.all(off) for off in variants]
-    findings = [[int(judged([one], plan.tolerance)) for one in own] for own in three]
+    findings = [[one.verdict(plan.tolerance) for one in own] for own in three]
     data: dict[str, Array] = {
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
         "change": np.array([[one.value for one in own] for own in three]),
@@ -113,7 +112,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "finding": np.array(findings, np.int8),
         "decision": np.array([int(book.verdict(off)) for off in variants], np.int8),
         "point_change": np.array([one.point for one in changes]),
-        "judged": counted.astype(np.int8),
+        "judged": plan.counted.astype(np.int8),
         "recommended": np.array([off == found.recommended for off in variants], np.int8),
         "work": np.array([book.work(off) for off in variants]),
         "evaluations": np.array([float(one.evaluations.mean()) for one in seen]),

@@ -14,6 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
+from hpcclear.base.verdict import Verdict
 from hpcclear.statistics.random.replicates import FEWEST, spread
 
 LEAST_KNOWN = 0.9
@@ -26,13 +27,11 @@ class Change(NamedTuple):
     value: float
     limit: float
 
-    def within(self, tolerance: float) -> bool:
-        """Whether it significantly is no larger."""
-        return bool(abs(self.value) + self.limit <= tolerance)
-
-    def beyond(self, tolerance: float) -> bool:
-        """Whether it significantly is larger."""
-        return bool(abs(self.value) - self.limit > tolerance)
+    def verdict(self, tolerance: float) -> Verdict:
+        """Whether it is within a tolerance, significantly; undecided where it is not known."""
+        if abs(self.value) - self.limit > tolerance:
+            return Verdict.FAILS
+        return Verdict.HOLDS if abs(self.value) + self.limit <= tolerance else Verdict.UNDECIDED
 
 
 UNKNOWN = Change(np.nan, np.nan)
