@@ -4,6 +4,7 @@ Root follows the lives (`hpcclear.dynamics.wear.life`) in parallel: what all of 
 simulated on all ranks and kept in the checkpoint; a resumed run requests the same again and finds it done.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array, Records
+from hpcclear.base.asking import all_answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.setup.parameters import wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST, Life
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Asked, Asking, LifePlan, WearOutcome, life
+from hpcclear.dynamics.wear.life import Asked, LifePlan, WearOutcome, life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
@@ -154,31 +156,29 @@ def follow(
     )  # fmt: skip
     relief = relief_of(scene)
     worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]
-    going: dict[int, tuple[Asking, Asked]] = {}
-    ended: dict[int, Life] = {}
-    for number in range(len(joints.clearance)):
-        _go_on(number, life(joints[number], plan, relief), None, going, ended)
-    with LivesProgress("wear", style, len(joints.clearance)) as progress:
-        while going:
-            progress.lives(len(ended), [asked.done for _, asked in going.values()])
+    count = len(joints.clearance)
+    with LivesProgress("wear", style, count) as progress:
+
+        def answer(going: Mapping[int, Asked]) -> Iterator[WearOutcome]:
+            nonlocal first
+            progress.lives(count - len(going), [asked.done for asked in going.values()])
             answers = _simulated(scene, states, going, first, ranks, checkpoint, progress)
             first += sum(len(one) for one in answers)
-            waiting, going = going, {}
-            for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
-                seen = _seen(answer, worn, len(scene.joint_labels), relief)
-                _go_on(number, asking, seen, going, ended)
-        progress.lives(len(ended), [])
-    return [ended[number] for number in range(len(joints.clearance))]
+            return (_seen(one, worn, len(scene.joint_labels), relief) for one in answers)
+
+        found = all_answered([life(joints[k], plan, relief) for k in range(count)], answer)
+        progress.lives(count, [])
+    return found
 
 
 def _simulated(
-    scene: Scene, states: States, going: dict[int, tuple[Asking, Asked]], first: int, *where: Any
+    scene: Scene, states: States, going: Mapping[int, Asked], first: int, *where: Any
 ) -> list[Records]:
     """Records of what each life requests, as one design; its first simulation has the number `first`. `where`: ranks,
     checkpoint and progress, as of `sample_points`."""
-    rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
+    rows = [states.rows(number, asked) for number, asked in going.items()]
     design = np.concatenate(rows)
-    late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
+    late = np.concatenate([np.array(asked.copies) % 2 == 1 for asked in going.values()])
     records = np.empty(len(design), record_of(scene))
     for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
         if chosen.any():
@@ -193,18 +193,6 @@ def waiting_longer(scene: Scene) -> Scene:
     numerics = scene.numerics
     wait = numerics.transient_revolutions + numerics.averaged_revolutions
     return scene.with_({"numerics.transient_revolutions": wait})
-
-
-def _go_on(
-    number: int, asking: Asking, seen: WearOutcome | None, going: dict[int, tuple[Asking, Asked]],
-    ended: dict[int, Life],
-) -> None:  # fmt: skip
-    """Send a life what it waited for; it requests more or ends."""
-    try:
-        asked = next(asking) if seen is None else asking.send(seen)
-        going[number] = asking, asked
-    except StopIteration as end:
-        ended[number] = end.value
 
 
 def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> WearOutcome:

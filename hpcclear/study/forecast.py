@@ -27,7 +27,7 @@ from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, tolerance, truth
+from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, truth
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
@@ -180,6 +180,5 @@ def _rehearsed(run: StudyRun, count: int, looked: int, samples: Mapping[str, int
     found = optimisation.optimise(run, simulations.model)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     better = search.search(run, [*ends, *between], simulations.model)
-    designs = stages.to_verify(run, ends, between, better)
-    rare.decided(run, designs, tolerance.verified(run, designs), "verification")
+    rare.decided(run, stages.to_verify(run, ends, between, better))
     return simulations.counts

@@ -6,8 +6,7 @@ longer while a verdict is open and `most_samples` allows. A few of their draws a
 that changes is part of the interval. Where plain and weighted samples contradict each other, both count.
 """
 
-import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.asking import all_answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict, together
 from hpcclear.scene.cases import Constraint
@@ -31,6 +31,8 @@ NEGLIGIBLE = 0.05
 
 LENGTH = 128
 """Draws of each repeat at first."""
+
+STAGE = "verification"
 
 _LEAST = 2.0**-54
 
@@ -60,10 +62,11 @@ class FailureEstimate(NamedTuple):
     """What was drawn from."""
 
 
-def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
-    """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open decided as far as
-    they can be, of designs that can be the best in an objective: the least of it first, until one keeps its constraints.
-    Besides ``rare_samples``, (n,): the simulations that took."""
+def decided(run: StudyRun, choices: Sequence[Choice]) -> Result:
+    """What `hpcclear.study.tolerance.verified` says of designs, rare failures that are open decided as far as they can be, of
+    designs that can be the best in an objective: the least of it first, until one keeps its constraints. Besides
+    ``rare_samples``, (n,): the simulations that took."""
+    true = tolerance.verified(run, choices)
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     many, tried = verdicts.rivals(choices), set[int]()
     densities = dict[tuple[str, int], Density]()
@@ -77,10 +80,8 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
         ]  # fmt: skip
         tried |= set(rows)
         keys = [(one.choice.case, k) for _, k, one in where]
-        found = probabilities(
-            run, [one for *_, one in where], [many[row] for row, *_ in where], stage, stage,
-            [densities.get(key) for key in keys],
-        )  # fmt: skip
+        asked, rivals = [one for *_, one in where], [many[row] for row, *_ in where]
+        found = probabilities(run, asked, rivals, [densities.get(key) for key in keys])
         for key, (row, k, one), its in zip(keys, where, found, strict=True):
             _enter(run, true, row, k, one, its)
             if not its.density.plain:
@@ -143,30 +144,25 @@ def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], colum
 
 
 def probabilities(
-    run: StudyRun,
-    asked: Sequence[Failing],
-    many: Sequence[int],
-    stage: str,
-    purpose: str,
-    densities: Sequence[Density | None] = (),
-) -> list[FailureEstimate]:
+    run: StudyRun, asked: Sequence[Failing], many: Sequence[int], densities: Sequence[Density | None]
+) -> list[FailureEstimate]:  # fmt: skip
     """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long; without pilots
     where `densities` of like designs are known."""
     rates = []
-    for one, known in itertools.zip_longest(asked, densities):
-        assert one.goal.limit is not None  # by validation
-        size, negligible = len(run.study.case(one.choice.case).random), NEGLIGIBLE * one.goal.most
-        rates.append(Rare(size, one.goal.limit, negligible, one.before, known))
+    for its, known in zip(asked, densities, strict=True):
+        assert its.goal.limit is not None  # by validation
+        size, negligible = len(run.study.case(its.choice.case).random), NEGLIGIBLE * its.goal.most
+        rates.append(Rare(size, its.goal.limit, negligible, its.before, known))
     unknown = [k for k, one in enumerate(rates) if one.density is None]
-    begun = [rates[k].prepared(run.rng("rare", purpose, "pilot")) for k in unknown]
-    answer(run, [asked[k] for k in unknown], begun, stage)  # all meet the same draws
+    begun = [rates[k].prepared(run.rng("rare", STAGE, "pilot")) for k in unknown]
+    answer(run, [asked[k] for k in unknown], begun, STAGE)  # all meet the same draws
     open_, round_ = list(range(len(asked))), 0
     while open_:
         going = []
         for one in (rates[k] for k in open_):  # all meet the same draws
-            rngs = [run.rng("rare", purpose, str(round_), str(k)) for k in range(REPEATS)]
+            rngs = [run.rng("rare", STAGE, str(round_), str(k)) for k in range(REPEATS)]
             going.append(one.lengthened(max(one.f.shape[1], LENGTH), rngs))
-        answer(run, [asked[k] for k in open_], going, stage)
+        answer(run, [asked[k] for k in open_], going, STAGE)
         round_ += 1
         open_ = [
             k for k in open_
@@ -218,16 +214,13 @@ def answer(
     stage: str,
 ) -> None:
     """Answer procedures of several designs by f, all that they request at a time in one batch."""
-    wanted = {k: next(one) for k, one in enumerate(going)}
-    while wanted:
+
+    def f_of(wanted: Mapping[int, Array]) -> list[Array]:
         parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
-        fresh = {}
-        for k, part in zip(wanted, parts, strict=True):
-            try:
-                fresh[k] = going[k].send(part[max(asked[k].goal.place - 1, 0)])
-            except StopIteration:
-                continue
-        wanted = fresh
+        places = (max(asked[k].goal.place - 1, 0) for k in wanted)
+        return [part[place] for part, place in zip(parts, places, strict=True)]
+
+    all_answered(going, f_of)
 
 
 def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:

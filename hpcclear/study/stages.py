@@ -110,7 +110,7 @@ def to_verify(
 
 
 def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verified:
-    true = run.stage("verification", _moments, found.designs)
+    true = run.stage("verification", rare.decided, found.designs)
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
     text, more = tolerance.reached(run, true, table)
@@ -118,11 +118,6 @@ def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verifi
     remarks += verification.undecided(run, table.choices, true)
     remarks += verification.missed(run, table.choices, true, models.searched)
     return Verified(table, true, remarks)
-
-
-def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Moments of designs, with what the tolerance does to them and with rare failures."""
-    return rare.decided(run, designs, tolerance.verified(run, designs), "verification")
 
 
 def _verified(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
