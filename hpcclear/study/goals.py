@@ -1,6 +1,7 @@
 """Objectives and constraints of a case: values with confidence intervals from simulations, or surrogate predictions."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.special import ndtr
@@ -114,14 +115,11 @@ def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
     """Of each that a case makes small, sampling coordinates (n, d) to its values (n,) if it is exact, else None."""
     names = scene.required_study.design_variables(case.name)
 
-    def of(goal: Goal) -> Callable[[Array], Array]:
-        def exact(points: Array) -> Array:
-            designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
-            return np.array(np.broadcast_to(goal.of_design(designs), len(points)))
+    def exact(goal: Goal, points: Array) -> Array:
+        designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
+        return np.array(np.broadcast_to(goal.of_design(designs), len(points)))
 
-        return exact
-
-    return [of(goal) if goal.exact else None for goal in case.goals]
+    return [partial(exact, goal) if goal.exact else None for goal in case.goals]
 
 
 def ends_in_all(study: Study) -> int:

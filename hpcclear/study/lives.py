@@ -14,6 +14,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.report.screens.lives import doubts
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.statistics.random.replicates import moments, student
@@ -70,7 +71,8 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
     ends = [name for case in cases for name in (f"{case.name} original", *case.ends)]
     table = np.full((len(designs), 4), np.nan)
     for row, choice in zip(table, designs, strict=True):
-        row[:] = _over_life(run, scene, choice) if choice.name in ends else np.nan
+        if choice.name in ends:
+            row[:] = _over_life(run, scene, choice)
     return dict(zip(("mean", "mean_reach", "deviation", "deviation_reach"), table.T, strict=True))
 
 
@@ -81,9 +83,7 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
         entries |= run.study.variable(name).entries(value)
     own = scene.with_(entries)
     name = NAME if own == scene else f"{FOLDER}/{choice.name.replace(' ', '_')}.nc"
-    options = Options(style=run.simulations.style)
-    timing = run.directory / "timing.nc"
-    found = run_wear(own, run.directory / name, run.ranks, options, timing).content
+    found = _followed(run, own, name)
     oldest = max(row.cycles or 0.0 for row in scene.required_study.worn)
     parts, at = (np.arange(AGES) + 0.5) / AGES, found["cycle"].values
     values = np.full((found.sizes["life"], AGES), np.nan)
@@ -97,6 +97,13 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     return tuple(estimates)
 
 
+def _followed(run: StudyRun, scene: Scene, name: str) -> Results:
+    """Lives of a scene, kept in a file of the study's directory."""
+    timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
+    options = Options(style=run.simulations.style)
+    return run_wear(scene, run.directory / name, run.ranks, options, timing).content
+
+
 def known(run: StudyRun) -> Scene:
     """A run's scene with clearances of its lives in place of inputs that wear; lives followed earlier are taken as they
     are.
@@ -105,9 +112,7 @@ def known(run: StudyRun) -> Scene:
     StorageError, RankFailed.
     """
     run.announce("wear")
-    scene, options = run.scene, Options(style=run.simulations.style)
-    timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
-    lives = run_wear(scene, run.directory / NAME, run.ranks, options, timing).content
+    scene, lives = run.scene, _followed(run, run.scene, NAME)
     for text in doubts(lives):
         run.notify(f"Lives: {text}.")
     changes = {}

@@ -88,22 +88,15 @@ def _search(run: StudyRun, problem: SwarmProblem, rng: np.random.Generator) -> F
     def broken(coordinates: Array) -> Array:
         return np.asarray(function(coordinates)[1])[:, None]
 
-    front = _minimised(run, problem, function, len(problem.case.goals), rng)
+    def minimised(made: Callable[[Array], Array | tuple[Array, Array]], objectives: int) -> Front:
+        search, task, name = _begun(run.scene, problem.region, objectives, rng)
+        return minimise(search, made, task, run.study.swarm.archive, name)
+
+    front = minimised(function, len(problem.case.goals))
     if len(front.values):
         return front
-    near = _minimised(run, problem, broken, 1, rng)  # no design keeps the constraints: the nearest
+    near = minimised(broken, 1)  # no design keeps the constraints: the nearest
     return replace(near, values=np.asarray(function(near.points)[0]))
-
-
-def _minimised(
-    run: StudyRun,
-    problem: SwarmProblem,
-    function: Callable[[Array], Array | tuple[Array, Array]],
-    objectives: int,
-    rng: np.random.Generator,
-) -> Front:
-    search, task, name = _begun(run.scene, problem.region, objectives, rng)
-    return minimise(search, function, task, run.study.swarm.archive, name)
 
 
 @dataclass(frozen=True)

@@ -123,11 +123,8 @@ class Simulated:
         together, because the replicates of one design are too few for it."""
         key = length, self._rung(1), self._rung(length)
         if key not in self._parts:
-            rows = [k for k, size in enumerate(self.sizes) if size >= length]
-            ours, its, their = (
-                np.nan_to_num([self._asked(k, *which)[1] for k in rows])
-                for which in ((length,), (length, True), (self._guesses.length, True))
-            )
+            every = (length,), (length, True), (self._guesses.length, True)
+            ours, its, their = (self._shifts(length, *which) for which in every)
             left = ((ours - slopes[:, None] * (its - their)) ** 2).sum(axis=(0, 2))
             own = (ours**2).sum(axis=(0, 2))
             self._parts[key] = np.sqrt(left / np.where(own > 0.0, own, np.inf))
@@ -137,17 +134,16 @@ class Simulated:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
         key = self._rung(1)
         if key not in self._slopes:
-            rows = [k for k, one in enumerate(self.made) if one.size]
-            ours, theirs = (
-                np.nan_to_num([self._asked(k, FIRST, guessed)[1] for k in rows])
-                for guessed in (False, True)
-            )
+            ours, theirs = (self._shifts(1, FIRST, guessed) for guessed in (False, True))
             squares = (theirs**2).sum(axis=(0, 2))
             both = (ours * theirs).sum(axis=(0, 2))
-            self._slopes[key] = np.where(
-                squares > 0.0, both / np.where(squares > 0.0, squares, 1.0), 0.0
-            )
+            self._slopes[key] = both / np.where(squares > 0.0, squares, np.inf)
         return self._slopes[key]
+
+    def _shifts(self, least: int, length: int, guessed: bool = False) -> Array:
+        """Shifts of all designs that have so many points of each replicate at least, 0 of those that failed."""
+        rows = np.flatnonzero(self.sizes >= least).tolist()
+        return np.nan_to_num([self._asked(k, length, guessed)[1] for k in rows])
 
     def _asked(self, row: int, length: int, guessed: bool = False) -> Asked:
         """A design by so many points of each replicate, simulated or by the surrogate."""

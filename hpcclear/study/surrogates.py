@@ -157,14 +157,10 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     ]
     points = np.arange(data["training_output"].shape[1])
     coords = {"model": np.array(names), "point": points, "parameter": np.array(parameters)}
-    about = None, _units(run), run.scene.objective, run.words
+    every = {coordinate(one): one for one in run.study.variables}
+    units = {n: (one.unit if one.ratio is None else "") or "1" for n, one in every.items()}
+    about = None, units, run.scene.objective, run.words
     content = dataset.dataset("kriging", coords, data, *about)
     if leaves[0][1].label and "surrogate" in content:
         content.attrs["title"] = f"Surrogates of the objective, {leaves[0][1].label}"
     run.write(content)
-
-
-def _units(run: StudyRun) -> dict[str, str]:
-    """Units of sampling coordinates, "1" for ratios."""
-    every = {coordinate(one): one for one in run.study.variables}
-    return {n: (one.unit if one.ratio is None else "") or "1" for n, one in every.items()}

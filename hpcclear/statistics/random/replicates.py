@@ -95,9 +95,8 @@ def moments(values: Array) -> tuple[Estimate, Deviation]:
 
     A failed simulation is NaN and left out; all is NaN where fewer than `FEWEST` values or replicates are left.
     """
-    known = np.isfinite(values)
-    counts = known.sum(axis=1)
-    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+    known, counts, few = _counted(values)
+    if few:
         none = np.full(len(values), np.nan)
         return Estimate(np.nan, none), Deviation(np.nan, none, np.nan)
     filled = np.where(known, values, 0.0)
@@ -114,6 +113,13 @@ def moments(values: Array) -> tuple[Estimate, Deviation]:
     fourth = float((squares**2).sum())
     carriers = float(squares.sum()) ** 2 / fourth if fourth > 0.0 else np.inf
     return Estimate(float(mean), average), Deviation(float(deviation), second, carriers)
+
+
+def _counted(values: Array) -> tuple[Booleans, Array, bool]:
+    """Which values are known, how many of each replicate, and whether values or replicates are fewer than `FEWEST`."""
+    known = np.isfinite(values)
+    counts = known.sum(axis=1)
+    return known, counts, bool(known.sum() < FEWEST or (counts > 0).sum() < FEWEST)
 
 
 def _shifts(sums: Array, counts: Array) -> Array:
@@ -136,9 +142,8 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
 
     Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur).
     """
-    known = np.isfinite(values)
-    counts = known.sum(axis=1)
-    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+    known, counts, few = _counted(values)
+    if few:
         return Limited(np.nan, np.full(len(values), np.nan), np.nan, np.nan)
     ranked = np.sort(values[known])
     total = len(ranked)
@@ -157,9 +162,8 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     """Probability of lying above `limit`, within [0, 1]; its interval is that of as many independent draws as have its error
     (Korn, Graubard). Values as in `moments`.
     """
-    known = np.isfinite(values)
-    counts = known.sum(axis=1)
-    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+    known, counts, few = _counted(values)
+    if few:
         return Limited(np.nan, np.full(len(values), np.nan), np.nan, np.nan)
     above = (known & (values > limit)).sum(axis=1)
     total = int(counts.sum())

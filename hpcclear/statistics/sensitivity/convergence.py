@@ -71,8 +71,11 @@ def convergence_intervals(
         plateau[c, j] = usable[start]
         uncertainty = _uncertainty(slope, error, lengths[usable] ** history.order)
         critical = _student(freedom, (1.0 - confidence) / (len(usable) - 1))
-        at = _first_determined(slope, error, uncertainty, critical, start)
-        if at is not None:
+        sure = np.abs(slope) > critical * uncertainty
+        sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
+        determined = start + 1 + np.flatnonzero((sure[1:] & sure_before)[start:])
+        if determined.size:
+            at = determined[0]
             interval[c, j] = usable[at]
             estimate[:, c, j] = slope[at], uncertainty[at]
     return ConvergenceIntervals(interval >= 0, interval, plateau, *estimate)
@@ -124,15 +127,3 @@ def _uncertainty(slope: Array, error: Array, truncation: Array) -> Array:
     """
     left = np.abs(np.diff(slope)) * truncation[1:] / -np.diff(truncation)
     return np.append(np.nan, np.hypot(error[1:], left))
-
-
-def _first_determined(
-    slope: Array, error: Array, uncertainty: Array, critical: Array, start: int
-) -> int | None:
-    """The widest interval after `start` in which, and before which, the slope is significantly not 0."""
-    sure = np.abs(slope) > critical * uncertainty
-    sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
-    for at in range(start + 1, len(slope)):
-        if sure[at] and sure_before[at - 1]:
-            return at
-    return None
