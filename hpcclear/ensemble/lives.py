@@ -32,10 +32,8 @@ def ages_of(scene: Scene, lives: list[Life]) -> Array:
     return np.union1d(np.linspace(0.0, longest, scene.wear.points), np.array(asked, float))
 
 
-def revolution_times(scene: Scene, inputs: Points | None) -> Array:
+def revolution_times(scene: Scene, inputs: Points) -> Array:
     """Duration (n,) of a revolution of each life, s, at the nominal speed: of a torque drive, the one its entries expect."""
-    if inputs is None:
-        return Parameters(parameters(scene)).period
     driven = [(path, k) for k, paths in enumerate(inputs.paths) for path in paths]
     names, columns = [path for path, _ in driven if ".wear." not in path], inputs.values.T
     values = np.array([columns[k] for path, k in driven if path in names])
@@ -51,7 +49,7 @@ def relief_of(scene: Scene) -> Relief:
 
 def lives_dataset(
     scene: Scene,
-    inputs: Points | None,
+    inputs: Points,
     joints: Joints,
     lives: list[Life],
     attributes: dict[str, str],
@@ -88,18 +86,15 @@ def lives_dataset(
     if even is not None:
         data |= {"local_clearance": local, "sharpest": np.array([one.sharpest for one in lives])}
         data |= _profiles(relief, found, angles) | _evenly(joints, even, cycles, limits)
-    names = () if inputs is None else inputs.names
-    if inputs is not None:
-        data |= {name: inputs.column(name) for name in names}
+    data |= dict(zip(inputs.names, inputs.values.T, strict=True))
     coords: dict[str, np.ndarray] = {
         "life": np.arange(len(lives)), "joint": np.array(scene.worn_joints(), dtype=str),
         "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
-        "random_input": np.array(names, dtype=str),
+        "random_input": np.array(inputs.names, dtype=str),
     } | ({} if even is None else {"angle": angles})  # fmt: skip
-    units, words = ({}, None) if inputs is None else (inputs.units, inputs.words)
     bounds = {f"limit_{name}": value for name, value in limits.items()}
     attrs = {**attributes, "tolerance": scene.wear.tolerance, **bounds}
-    return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)
+    return dataset.dataset("wear", coords, data, attrs, inputs.units, scene.objective, inputs.words)
 
 
 def _curves(found: list[Curves], ages: int, labels: int) -> dict[str, Array]:
@@ -126,15 +121,13 @@ def _of_lives(lives: list[Life]) -> dict[str, Array]:
     }
 
 
-def _causes(inputs: Points | None, joints: Joints, lives: list[Life], last: list[Curves]) -> Array:
+def _causes(inputs: Points, joints: Joints, lives: list[Life], last: list[Curves]) -> Array:
     """Rank correlation of each random input with the growth of each clearance a revolution, (inputs, joints)."""
     ended = np.array([one.ended if one.reason or one.status.valid else np.nan for one in lives])
     grown = np.concatenate([one.clearance for one in last]) - joints.clearance
     growth = grown / np.where(ended > 0.0, ended, np.nan)[:, None]
-    if inputs is None:
-        return np.empty((0, growth.shape[1]))
-    columns = inputs.values.T
-    return np.array([[rank_correlation(column, one) for one in growth.T] for column in columns])
+    found = [rank_correlation(column, one) for column in inputs.values.T for one in growth.T]
+    return np.reshape(found, (-1, growth.shape[1]))
 
 
 def _reason(one: Life) -> str:

@@ -92,11 +92,11 @@ def of_lives(scene: Scene) -> Scene:
     return scene.with_(changes)
 
 
-def inputs_of(scene: Scene) -> Points | None:
-    """Random inputs of every life, a row each; None for a single one, which is the scene as it stands."""
+def inputs_of(scene: Scene) -> Points:
+    """Random inputs of every life, a row each; no columns for a single one, which is the scene as it stands."""
     assert scene.wear is not None
     if scene.wear.lives == 1:
-        return None
+        return Points((), np.empty((1, 0)), ())
     return monte_carlo(of_lives(scene), scene.wear.lives, design={}, purpose="wear")
 
 
@@ -104,20 +104,19 @@ class States:
     """States of wear as designs: random inputs that do not wear, then clearance and bearing radius of every worn joint, then,
     where profiles are followed, the waves around its surfaces."""
 
-    def __init__(self, scene: Scene, inputs: Points | None, joints: Joints) -> None:
+    def __init__(self, scene: Scene, inputs: Points, joints: Joints) -> None:
         own = [f"{scene.joint_key(name)}." for name in scene.worn_joints()]
         changing = [f"{key}{entry}" for key in own for entry in ("clearance", "bearing_radius")]
         self.relief = relief_of(scene)
         waves = [path for name in scene.worn_joints() for path in wave_paths(scene, name)]
         waves = waves if self.relief.size else []
         changing += waves
-        driven = [path for paths in (() if inputs is None else inputs.paths) for path in paths]
+        driven = [path for paths in inputs.paths for path in paths]
         free = [path for path in driven if path not in changing and ".wear." not in path]
         get = Numbers(scene, inputs)
-        fixed = [get(path) for path in free]
         self.names = (*free, *changing)
         self._new = np.array([get.known(path) for path in waves]).reshape(-1, get.size).T
-        self._fixed = np.array(fixed).reshape(-1, get.size).T
+        self._fixed = np.array([get(path) for path in free]).reshape(-1, get.size).T
         self._joints = joints
 
     def rows(self, number: int, asked: Asked) -> Array:
