@@ -6,7 +6,7 @@ Where few or none of a design's simulations fail its index comes from the larges
 decide nothing.
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +68,11 @@ class Failures:
     def prepare(self, choice: Choice) -> None:
         """Find the densities of the failures of a design of which nothing is known."""
         for goal in self.goals:
-            rare.answer(self._run, [rare.Failing(choice, goal)], [self._prepared(goal)], "search")
+            assert goal.limit is not None  # by validation
+            sizes = 0.05 * goal.most, PILOT
+            pilot = importance.pilot(self._inputs, goal.limit, self._rng, *sizes)
+            asked = [rare.Failing(choice, goal)]
+            self.densities += rare.answer(self._run, asked, [pilot], "search")
 
     def draw(self, choices: Sequence[Choice], rows: Sequence[int], length: int) -> None:
         """Take so many weighted draws of each repeat of some designs: the same of all."""
@@ -103,13 +107,6 @@ class Failures:
             if failing >= HITS and bdtrc(failing - 1, len(f), share) < MISSED:
                 return value, error
         return _index_of(goal, share, float(spread((each - share)[None])[0]))
-
-    def _prepared(self, goal: Constraint) -> Generator[Array, Array, None]:
-        """Yield draws, take f there, and keep the density that is found."""
-        assert goal.limit is not None  # by validation
-        negligible = 0.05 * goal.most
-        going = importance.pilot(self._inputs, goal.limit, self._rng, negligible, PILOT)
-        self.densities.append((yield from going))
 
     def _renewed(self, k: int) -> Density:
         """The density of the failures of all designs near the threshold, each as important, if there are enough."""

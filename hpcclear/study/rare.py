@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.base.asking import all_answered
+from hpcclear.base.asking import Found, all_answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict, together
 from hpcclear.scene.cases import Constraint
@@ -208,19 +208,16 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
 
 
 def answer(
-    run: StudyRun,
-    asked: Sequence[Failing],
-    going: Sequence[Generator[Array, Array, None]],
-    stage: str,
-) -> None:
-    """Answer procedures of several designs by f, all that they request at a time in one batch."""
+    run: StudyRun, asked: Sequence[Failing], going: Sequence[Generator[Array, Array, Found]], stage: str
+) -> list[Found]:  # fmt: skip
+    """What procedures of several designs find by f, all that they request at a time in one batch."""
 
     def f_of(wanted: Mapping[int, Array]) -> list[Array]:
         parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
         places = (max(asked[k].goal.place - 1, 0) for k in wanted)
         return [part[place] for part, place in zip(parts, places, strict=True)]
 
-    all_answered(going, f_of)
+    return all_answered(going, f_of)
 
 
 def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
