@@ -14,14 +14,14 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.ranks.leading import FLUSH_INTERVAL
-from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
+from hpcclear.ranks.schedule import QUANTUM, TAIL, Need, allot
 
 LANES = 32
 LATENCY = 5e-6  # s, network
 WORK = 60.0  # s of work for a rank
 MOST_REQUESTS = 2_000_000  # beyond, root's load alone decides
 
-Policy = Callable[[int, int, Need], Allotment]
+Policy = Callable[[int, int, Need], tuple[int, int]]
 
 
 class Costs(NamedTuple):
@@ -52,21 +52,21 @@ class Outcome(NamedTuple):
 # ---- policies ------------------------------------------------------------------------------------
 
 
-def equal_shares(remaining: int, ranks: int, need: Need) -> Allotment:
+def equal_shares(remaining: int, ranks: int, need: Need) -> tuple[int, int]:
     """Everything at once; `simulate` asks only once and gives each rank an equal share."""
-    return Allotment(remaining, 0)
+    return remaining, 0
 
 
-def half_a_second(remaining: int, ranks: int, need: Need) -> Allotment:
+def half_a_second(remaining: int, ranks: int, need: Need) -> tuple[int, int]:
     """Blocks of half a second, whatever is left and however many ask."""
     size = min(remaining, max(2 * need.lanes, math.ceil(0.5 * need.rate)))
-    return Allotment(size, need.lanes + math.ceil(0.1 * need.rate))
+    return size, need.lanes + math.ceil(0.1 * need.rate)
 
 
-def guided(remaining: int, ranks: int, need: Need) -> Allotment:
+def guided(remaining: int, ranks: int, need: Need) -> tuple[int, int]:
     """Half the fair share of what is left, however long that takes."""
     size = min(remaining, max(1, math.ceil(remaining / (TAIL * ranks))))
-    return Allotment(size, need.lanes + math.ceil(0.1 * need.rate))
+    return size, need.lanes + math.ceil(0.1 * need.rate)
 
 
 POLICIES: dict[str, Policy] = {

@@ -51,31 +51,30 @@ def run_points(
     earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
     progress = Progress("", style="quiet") if progress is None else progress
     book = HandOut(len(points), earlier["sample"], task.workers or ranks.size)
-    lead = Lead(ranks, book, points)
-    lead.on_records, lead.save, lead.progress = on_records, save, progress
-    lead.kept = Kept(len(points), earlier) if keep else None
+    kept = Kept(len(points), earlier) if keep else None
+    lead = Lead(ranks, book, points, on_records, save, progress, kept)
     progress.start(len(points), earlier)
     with contextlib.closing(progress), ranks.timed(task.name) as spent:
         if not book.done:
             lead.work(task, spent)
             ranks.suspects = list
-    return earlier[:0] if lead.kept is None else lead.kept.records()
+    return earlier[:0] if kept is None else kept.records()
 
 
 class Lead:
     """Root's part in a stage: a design on its way through the ranks, seen from who hands it out."""
 
-    def __init__(self, ranks: Ranks, book: HandOut, points: PointSource) -> None:
+    def __init__(
+        self, ranks: Ranks, book: HandOut, points: PointSource, on_records: Callable[[np.ndarray], object] | None,
+        save: Callable[[], object] | None, progress: Progress, kept: Kept | None,
+    ) -> None:  # fmt: skip
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
         self._present = set(range(1, ranks.size))  # ranks that will still say DONE
         self._early = time.monotonic() + EARLY
         self._closing = self._failed = False
-        self.book = book
-        self.progress = Progress("", style="quiet")
-        self.on_records: Callable[[np.ndarray], object] | None = None
-        self.save: Callable[[], object] | None = None
-        self.kept: Kept | None = None
+        self.book, self.progress, self.kept = book, progress, kept
+        self.on_records, self.save = on_records, save
 
     def work(self, task: Task, spent: np.ndarray) -> None:
         """Run the stage; whatever ends it, everything finished is collected and delivered.

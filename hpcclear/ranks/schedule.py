@@ -85,15 +85,9 @@ class Need(NamedTuple):
     rate: float  # samples it finishes a second; 0 = not known yet
 
 
-class Allotment(NamedTuple):
-    """What it gets: so many samples, and the stock below which it requests more."""
-
-    size: int
-    ask_below: int
-
-
-def allot(remaining: int, ranks: int, need: Need) -> Allotment:
-    """Size of the next block for one rank, of `remaining` samples: enough to stay busy, less and less towards the end.
+def allot(remaining: int, ranks: int, need: Need) -> tuple[int, int]:
+    """Size of the next block for one rank, of `remaining` samples: enough to stay busy, less and less towards the end; and the
+    stock below which the rank requests more.
 
     Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank does in about half a second
     (longer on many ranks, so that root is not swamped by requests), never more than half its fair share of what is left, never
@@ -112,7 +106,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     size = min(remaining, max(min(wanted, guided), to_fill))
     ends_soon = remaining - size < ranks * stock
     ask_below = max(need.lanes, int(lead)) if ends_soon else need.lanes + math.ceil(max(lead, 1.0))
-    return Allotment(size, ask_below)
+    return size, ask_below
 
 
 class HandOut:
