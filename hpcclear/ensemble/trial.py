@@ -156,10 +156,9 @@ class Trial:
 
     def variant(self, off: Variant) -> Off:
         """The scene with them off."""
-        if not self.possible(off):
+        made = self._variants[off] if self.possible(off) else None
+        if made is None:
             raise ValueError(f"{self.names(off)} cannot be off together")
-        made = self._variants[off]
-        assert made is not None
         return made
 
     def implicit(self, off: Variant) -> bool:

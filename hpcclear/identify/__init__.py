@@ -1,12 +1,4 @@
-"""Unknown clearances of a machine from a measured signal: posterior distribution, model check, what to measure.
-
-- `signals`, `measured`: signals by name as harmonics of the crank, of a response and of a table; sensors
-- `inputs`, `training`: what is not known, and an ensemble of machines as they may be
-- `features`, `summaries`: harmonics, third octaves, scatter; regressions of the inputs on them
-- `posterior`, `judgement`: models of the summaries, posterior by sequential Monte Carlo, calibration, model check
-- `history`, `advice`: growth over several dates; which signal to measure
-- `answer`: the command
-"""
+"""Unknown clearances of a machine from a measured signal: posterior distribution, model check, what to measure."""
 
 from __future__ import annotations
 

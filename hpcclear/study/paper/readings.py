@@ -162,15 +162,10 @@ def _mean_over_steps(scene: Scene, response: Results) -> Array:
 
 def _smallest(run: StudyRun, choice: Choice) -> Points:
     """The design itself at the smallest clearance."""
-    clearance = _clearance(run)
+    clearance = own_names(run.scene)["C"]
     names = (*choice.design, clearance)
     lowest = run.study.variable(clearance).bounds[0]
     return run.simulations.filled(names, np.array([[*choice.design.values(), lowest]]))
-
-
-def _clearance(run: StudyRun) -> str:
-    """The study's name of the variable that drives both clearances."""
-    return own_names(run.scene)["C"]
 
 
 def _scene(run: StudyRun, reading: Interpretation) -> Scene:
@@ -179,7 +174,7 @@ def _scene(run: StudyRun, reading: Interpretation) -> Scene:
 
 def _read(run: StudyRun, reading: Interpretation, points: Points) -> Points:
     """Samples with the further columns that a reading moves."""
-    clearance = points.column(_clearance(run))
+    clearance = points.column(own_names(run.scene)["C"])
     built = {joint: run.scene.number(f"joints.{joint}.bearing_radius") for joint in JOINTS}
     names, columns, paths = list(points.names), [points.values], list(points.paths)
 
