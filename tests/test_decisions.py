@@ -133,7 +133,8 @@ def test_no_design_is_recommended_within_constraints_that_it_may_break(
     first = screen_of(Content(Path("out"), {"verification": verified(verdict, price, excess)}))
     assert first.headline.startswith("No simulated design")
     assert first.header[-1] == "nearest"
-    assert first.tiles[0].before  # of the constraint, as it has the value of the baseline too
+    assert [one.label for one in first.tiles[:2]] == ["mean of f", "m2"]  # what is made small
+    assert first.tiles[2].before  # of the constraint, as it has the value of the baseline too
     assert text["criterion"].startswith(f"{nearest}: ")
     assert first.trust[0].level is Level.RED
     assert "within the constraints" not in " ".join(one.text for one in lines)
