@@ -48,8 +48,9 @@ DRAWS = 64
 """Draws of what is believed: of three or more objectives for an expected improvement without a closed form, and of all designs
 together."""
 
-UNSEEN = 4.0
-"""Standard deviations that a design may be below its mean in draws: where that is not the least mean it is not drawn."""
+UNSEEN, MOST = 4.0, 400
+"""Standard deviations that a design may be below its mean in draws: where that is not the least mean it is not drawn; and how
+many designs are drawn at most, those that may be the least."""
 
 ROUND_OFF = 1e-9
 """Smallest variance that is drawn, over the largest."""
@@ -88,7 +89,8 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     points = np.vstack([beliefs.known.designs[beliefs.allowed], _candidates(beliefs)])
     points = points[beliefs.feasible(points) >= LIKELY]
     mean, variance = beliefs.means(points) @ direction, beliefs.variances(points) @ direction**2
-    may = mean - UNSEEN * np.sqrt(variance) <= mean.min(initial=np.inf)
+    least = mean - UNSEEN * np.sqrt(variance)
+    may = np.argsort(least, kind="stable")[: min((least <= mean.min(initial=np.inf)).sum(), MOST)]
     points, mean = points[may], mean[may]
     new = _apart(points, beliefs)
     if not new.any():
@@ -99,8 +101,8 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
             square += weight**2 * model.rest.covariance(points)
     draws = beliefs.rng.standard_normal((DRAWS, len(points)))
     # Known designs have next to no variance, and round-off makes some of it negative: pivots end before these.
-    least = ROUND_OFF * max(square.diagonal().max(), 0.0)
-    factor, order, rank, _ = dpstrf(square, tol=least, lower=1)
+    smallest = ROUND_OFF * max(square.diagonal().max(), 0.0)
+    factor, order, rank, _ = dpstrf(square, tol=smallest, lower=1)
     paths = np.tile(mean, (DRAWS, 1))
     paths[:, order - 1] += draws[:, :rank] @ np.tril(factor)[:, :rank].T
     loss = paths[:, mean.argmin()] - paths.min(axis=1)
