@@ -40,7 +40,7 @@ from hpcclear.study import launched, lives, optimisation
 from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
-from hpcclear.study.stages import Announcer, carry_out, files_of
+from hpcclear.study.stages import announcer, carry_out, files_of
 
 __all__ = ["run_study"]
 
@@ -122,10 +122,9 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     columns = tuple(variable.paths for variable in study.variables)
     points = expanded(study, Points(study.names, np.empty((0, len(columns))), columns))
     compile_ahead(scene, session.ranks, points, style)
-    announce = Announcer(scene, style).announced
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     where = scene, session.place.output, session.ranks, checkpoint, simulations
-    run = StudyRun(*where, session.notify, announce)
+    run = StudyRun(*where, session.notify, announcer(scene, style))
     with saving(checkpoint.flush):  # samples of small stages wait for the next save
         carry_out(run, certificate_extent)
     return run.times

@@ -267,19 +267,17 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
         results[stage.name] = stage.run(results.get("wear", run), *arguments)
 
 
-class Announcer:
-    """Reports each stage of a study of this scene as it begins, on standard error, in a style of progress."""
+def announcer(scene: Scene, style: Style) -> Callable[[str], None]:
+    """What writes, by its name, which stage of a study begins, and how long the study has taken so far."""
+    counted = [stage.words for stage in stages_of(scene) if stage.words]
+    began = time.monotonic()
 
-    def __init__(self, scene: Scene, style: Style) -> None:
-        self._style = style
-        self._counted = [stage.words for stage in stages_of(scene) if stage.words]
-        self._began = time.monotonic()
-
-    def announced(self, name: str) -> None:
-        """Write which stage begins, and how long the study has taken so far."""
+    def announced(name: str) -> None:
         kind = name.partition("-")[0]
-        for number, words in enumerate(self._counted, 1):
+        for number, words in enumerate(counted, 1):
             if kind in words:
-                spent = duration(time.monotonic() - self._began)
-                text = f"stage {number} of {len(self._counted)}: {words[kind]} ({spent} so far)"
-                announce(text, self._style)
+                spent = duration(time.monotonic() - began)
+                text = f"stage {number} of {len(counted)}: {words[kind]} ({spent} so far)"
+                announce(text, style)
+
+    return announced

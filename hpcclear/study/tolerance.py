@@ -124,12 +124,11 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         paired |= set(fresh)
         if run.study.paired:
             made = truth.made(run, designs, made, _left(run, taken))
-    true = _widened(run, designs, made, truth.results_of(run, designs, made), taken)
-    without: set[int] = set()
+    true, without = _widened(run, designs, made, taken), set[int]()
     while undone := _undone(run, designs, made, true) - without:
         without |= undone
         made = truth.made(run, designs, made, _left(run, taken), without)
-        true = _widened(run, designs, made, truth.results_of(run, designs, made), taken)
+        true = _widened(run, designs, made, taken)
     return true | contributions.of_designs(run, designs, made)
 
 
@@ -176,11 +175,10 @@ def _begun(
     """The first points of all designs at the stricter tolerance, (k, replicates, values) each."""
     draws, tight = run.study.verification.draws, run.of(stricter(run.scene)[0])
     if draws is None:
-        length = _first(min(one.shape[2] for one in made), len(designs), most)
-        strict = truth.drawn(tight, designs, "pairs", length)
+        count = _first(min(one.shape[2] for one in made), len(designs), most)
     else:
         count = _of_draws(draws, len(designs), most)
-        strict = truth.drawn(tight, designs, "pairs", count, None)
+    strict = truth.drawn(tight, designs, "pairs", count, 0 if draws is None else None)
     run.simulations.next = tight.simulations.next
     return strict
 
@@ -299,9 +297,10 @@ def _shares(run: StudyRun, choice: Choice, whole: Array, bias: Array, error: Arr
 
 
 def _widened(
-    run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], true: Result, taken: Taken
+    run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], taken: Taken
 ) -> Result:
-    """All intervals with what the tolerance takes of each design."""
+    """What `truth.results_of` returns, with what the tolerance takes of each design in all intervals."""
+    true = truth.results_of(run, designs, made)
     settings, many = run.study.verification, verdicts.rivals(designs)
     true["tolerance"] = abs(taken.bias[:, 0])
     true["tolerance_error"] = taken.error[:, 0]
