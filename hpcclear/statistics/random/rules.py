@@ -73,10 +73,15 @@ def _(law: Uniform, centres: Array, length: float) -> Array:
 
 @kernel_integral.register
 def _(law: Normal, centres: Array, length: float) -> Array:
-    if law.reach == inf:
-        return _normal_kernel_integral(law, centres, length, -inf, inf)
-    mass = float(_normal_between(*map(np.float64, _limits(law))))
-    return _normal_kernel_integral(law, centres, length, *law.span) / mass
+    (lower, upper), mass = (-inf, inf), 1.0
+    if law.reach != inf:
+        (lower, upper), mass = law.span, float(_normal_between(*map(np.float64, _limits(law))))
+    mean, deviation = law.middle, law.deviation
+    width = sqrt(deviation**2 + length**2)  # the product of density and kernel is normal again
+    narrow = deviation * length / width
+    middle = (mean * length**2 + np.asarray(centres) * deviation**2) / width**2
+    height = length / width * np.exp(-0.5 * ((centres - mean) / width) ** 2)
+    return height * _normal_between((lower - middle) / narrow, (upper - middle) / narrow) / mass
 
 
 @kernel_integral.register
@@ -175,15 +180,3 @@ def _normal_between(low: np.ndarray | np.float64, high: np.ndarray | np.float64)
     flip = low > 0
     low, high = np.where(flip, -high, low), np.where(flip, -low, high)
     return ndtr(high) - ndtr(low)
-
-
-def _normal_kernel_integral(
-    law: Normal, centres: Array, length: float, lower: float, upper: float
-) -> Array:
-    """Integral of normal density times kernel between bounds: the product is normal again."""
-    mean, deviation = law.middle, law.deviation
-    width = sqrt(deviation**2 + length**2)
-    narrow = deviation * length / width
-    middle = (mean * length**2 + np.asarray(centres) * deviation**2) / width**2
-    height = length / width * np.exp(-0.5 * ((centres - mean) / width) ** 2)
-    return height * _normal_between((lower - middle) / narrow, (upper - middle) / narrow)
