@@ -170,9 +170,8 @@ def measure(
 ) -> Results:
     """Measure what accuracy costs for a scene with a clearance joint at least; on root. Returns results of kind ``accuracy``.
 
-    `notify` gets what is going on, a line at a time; the store keeps finished work; `show` gets the dataset of all that is
-    there whenever there is more of it. Raises InputError if both joints are ideal: the objective is 0 then, whatever the
-    settings.
+    `notify`, `show`: as of `Panels`; the store keeps finished work. Raises InputError if no joint has clearance, or the
+    objective is of some joints.
     """
     if scene.objective.joints:
         key, joints = "numerics.objective_joints", scene.numerics.objective_joints

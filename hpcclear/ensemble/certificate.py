@@ -222,13 +222,12 @@ def _together(book: Book, good: list[int]) -> Part:
     explicit = plan.implicit(()) and not plan.implicit(_set(book, good))
     for effects in [good, cheap] if explicit else [cheap]:  # what is stiff saves nothing alone
         chosen = _set(book, effects)
-        yield from _judge(book, [one for one in [chosen] if one not in book.seen], plan.budget)
+        yield from _judge(book, [chosen], plan.budget)
         if len(chosen) < 3 or book.verdict(chosen) is Verdict.HOLDS or book.spent() > plan.budget:
             continue
         pairs = [p for p in itertools.combinations(chosen, 2) if plan.possible(p)]
         yield from _judge(book, pairs[:MOST_PAIRS], plan.budget)
-        chosen = _set(book, effects)
-        yield from _judge(book, [one for one in [chosen] if one not in book.seen], plan.budget)
+        yield from _judge(book, [_set(book, effects)], plan.budget)
 
 
 def _set(book: Book, effects: list[int]) -> Variant:

@@ -98,8 +98,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     Raises InputError: the objective is zero with all effects on, so that no change of it is relative to anything.
     """
     book, plan, variants = found.book, found.book.plan, found.variants
-    whole = book.all(())
-    _refuse_zero(trial.scene, whole)
+    _refuse_zero(trial.scene, book.all(()))
     changes = [book.changes(off) for off in variants]
     reduced = trial.variant(found.recommended).scene
     three = [one[:3] for one in changes]

@@ -4,6 +4,7 @@ The kernel, scenes and files are imported where they are used: inside the rank b
 that fails on one rank ends them all.
 """
 
+from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -64,10 +65,8 @@ def payload_of(scene: "Scene", points: "Points") -> Payload:
     return Payload(content_of(scene), points.names, points.paths, DEFAULT_LANES)
 
 
-_COMPILED: list[Payload] = []
+_COMPILED = deque[Payload](maxlen=8)
 """Payloads whose evaluators were made in this process before: small stages need not wait for ranks to meet again."""
-
-_MOST_COMPILED = 8
 
 
 def make_evaluator(payload: Payload, ranks: Ranks) -> "Judge":
@@ -80,7 +79,7 @@ def make_evaluator(payload: Payload, ranks: Ranks) -> "Judge":
     # All ranks have made the same ones before, so all wait for each other or none does.
     if payload not in _COMPILED:
         first_compiled(evaluator, ranks)
-        _COMPILED[:] = [*_COMPILED[1 - _MOST_COMPILED :], payload]
+        _COMPILED.append(payload)
     return Judge(evaluator, scene.objective)
 
 

@@ -80,13 +80,12 @@ class Drawn:
             return self._vicinity(first, count)
         each, purpose = 1 if self.scattered else self.size, "designs of effects"
         draw = partial(monte_carlo, self._scene)
-        begin = partial(draw, count * each, replicate=0, first=first * each)
-        designs = begin(random=(), purpose=purpose)
+        designs = draw(count * each, random=(), purpose=purpose, replicate=0, first=first * each)
         if not self.scattered:
             return designs
         rows = (dict(zip(designs.names, row, strict=True)) for row in designs.values.tolist())
         about = partial(draw, self.size, purpose="effects")
-        parts = [about(replicate=first + k, design=row) for k, row in enumerate(rows)]
+        parts = [about(replicate=k, design=row) for k, row in enumerate(rows, first)]
         return Points(parts[0].names, np.concatenate([one.values for one in parts]), parts[0].paths)
 
     def _vicinity(self, first: int, count: int) -> Points:

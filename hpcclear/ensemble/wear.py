@@ -117,11 +117,11 @@ class States:
         self.names = (*free, *changing)
         self._new = np.array([get.known(path) for path in waves]).reshape(-1, get.size).T
         self._fixed = np.array([get(path) for path in free]).reshape(-1, get.size).T
-        self._joints = joints
+        self.joints = joints
 
     def rows(self, number: int, asked: Asked) -> Array:
         """Designs of a life's copies, shape (copies, names)."""
-        clearance, radius = self._joints[number].worn(asked.work)
+        clearance, radius = self.joints[number].worn(asked.work)
         factors = 1.0 + PERTURBATION * np.array(asked.copies)[:, None]
         state = np.stack([clearance * factors, np.repeat(radius[None], len(factors), axis=0)], -1)
         fixed = np.repeat(self._fixed[number][None], len(factors), axis=0)
@@ -129,7 +129,7 @@ class States:
         if self.relief.size:
             worn = np.zeros(self._new.shape[1])
             if asked.moments is not None:
-                worn = self.relief.waves(self._joints[number], asked.moments).ravel()
+                worn = self.relief.waves(self.joints[number], asked.moments).ravel()
             parts.append(np.repeat((self._new[number] + worn)[None], len(factors), axis=0))
         return np.concatenate(parts, axis=1)
 
@@ -140,7 +140,6 @@ class States:
 
 def follow(
     scene: Scene,
-    joints: Joints,
     states: States,
     ranks: Ranks,
     checkpoint: Checkpoint,
@@ -153,7 +152,7 @@ def follow(
         scene.wear.cycles, scene.wear.tolerance, float(scene.numerics.averaged_revolutions), scene.wear.copies,
         scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
     )  # fmt: skip
-    relief = relief_of(scene)
+    relief, joints = relief_of(scene), states.joints
     worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]
     count = len(joints.clearance)
     with LivesProgress("wear", style, count) as progress:
@@ -222,7 +221,7 @@ def run_wear(
     def make(session: Session) -> Results:
         session.describe(scene)
         checkpoint = session.opened(states.points(np.empty((0, len(states.names)))).units)
-        where = joints, states, ranks, checkpoint, options.style
+        where = states, ranks, checkpoint, options.style
         lives, even = follow(scene, *where), None
         if states.relief.size:  # the same lives, worn evenly, for comparison
             done = sum(one.simulations for one in lives)

@@ -123,13 +123,9 @@ class Watch:
                     due = now + self._period
                 if self._over.wait(self._period / _LOOKS):
                     return
-                self._listen()
+                for rank, tag in self._mail.pulses() if self._neighbours else ():
+                    self._neighbours[rank].heard(tag)
             self._beat()
-
-    def _listen(self) -> None:
-        if self._neighbours:
-            for rank, tag in self._mail.pulses():
-                self._neighbours[rank].heard(tag)
 
     def _beat(self) -> None:
         for rank, neighbour in self._neighbours.items():
