@@ -11,7 +11,7 @@ from hpcclear.results.content import Results
 def drawings(
     files: Files, responses: Mapping[str, Results]
 ) -> "dict[str, Callable[[], style.Figure]]":
-    """Return what draws each figure that results allow, by its name; of several responses, by design, figures have columns."""
+    """Return what draws each figure that results allow, by its name; several responses stand beside each other in a figure."""
     made = {one.name: one.of(files) for one in declared(FigureOf) if one.kind in files}
     if responses:
         first = next(iter(responses.values()))

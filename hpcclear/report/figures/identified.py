@@ -49,7 +49,8 @@ def posterior_figure(identify: Results) -> "style.Figure":
     "Measured less predicted features of the last record, in standard deviations of the prediction.", 1
 )  # fmt: skip
 def features_figure(identify: Results) -> "style.Figure":
-    """Standard score of each measured feature of the last record. Raises InputError where no signal was measured."""
+    """Measured less predicted features of the last record over their predictive standard deviation. Raises InputError where no
+    signal was measured."""
     _check(identify)
     last = identify.isel(record=-1)
     measured, predicted = last["measured"].values, last["predicted"].values

@@ -23,7 +23,8 @@ _EXPONENT = "largest Lyapunov exponent (1/revolution)"
     kind="map",
 )
 def map_figure(samples: Results) -> "style.Figure":
-    """Exponent, period and regime of each cell; along a line also f with its interval. Raises InputError of what is no map."""
+    """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval. Raises InputError of
+    another kind."""
     cells = cells_of(samples)
     names = [str(name) for name in cells["objective"].dims]
     return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
@@ -107,7 +108,7 @@ def _line(cells: Results, name: str) -> "style.Figure":
     "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions."
 )
 def bifurcation_figure(bifurcation: Results) -> "style.Figure":
-    """Values once a revolution against the varied entry; n dots where the motion repeats every n. InputError of other kinds."""
+    """Values once a revolution against the varied entry; n dots where the motion repeats every n. InputError of others."""
     variables = labels.design_variables(bifurcation)
     if not variables or bifurcation.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"

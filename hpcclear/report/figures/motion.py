@@ -12,7 +12,7 @@ TURN = 2.0 * np.pi
 
 
 def phase(response: Results) -> Array:
-    """Progress of the drive, rad, 2 pi a turn or swing, shape (time,); of a slider-crank the crank angle, turned to rise."""
+    """Progress of the drive, rad, 2 pi a turn or swing, shape (time,); of a slider-crank the crank angle, which rises."""
     if "drive_phase" in response:
         return response["drive_phase"].values
     angle = response["crank_angle"].values

@@ -68,7 +68,8 @@ def force_polar_figure(response: Results) -> "style.Figure":
 
 @style.figure("phase portraits", 50)
 def phase_figure(response: Results) -> "style.Figure":
-    """Phase portraits of the slider, or of a linkage's last body, over the same revolutions as `orbit_figure`."""
+    """Phase portraits of the slider, or of a linkage's last body: velocity over position, acceleration over velocity; over the
+    same revolutions as `orbit_figure`."""
     from matplotlib.collections import LineCollection
 
     shown = motion.steady(response)
