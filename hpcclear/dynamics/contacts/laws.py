@@ -1,6 +1,7 @@
 """Laws and rates of objectives compiled into the lanes: modules of their generated source, whose functions motions call."""
 
 import hashlib
+from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 
@@ -11,41 +12,32 @@ from hpcclear.laws.objectives import text_of_rate
 from hpcclear.laws.sources import text_of
 
 
+@dataclass(unsafe_hash=True, repr=False)
 class InLanes:
     """A law as effects name it: its functions, each with the arguments of `laws.sources`, and what steppers have to know of it.
 
     contact: ``force`` (N, cut at 0), ``elastic`` (N), ``kink``; friction: ``ratio``, ``deflection`` (m/s), ``low``, ``high``.
     """
 
-    def __init__(self, text: str, title: str, facts: tuple[str, ...]) -> None:
-        self._made_of = text, title, facts
-        self.title, self.facts = title, facts
-        self.name = f"law_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-        module: ModuleType = module_of(self.name, text)
+    text: str
+    title: str
+    facts: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        known = "latched", "bristled", "whole", "largest"
+        flags = (1 if one in self.facts else None for one in known)
+        self.latched, self.bristled, self.whole, self.largest = flags
+        self.name = f"law_{hashlib.sha256(self.text.encode()).hexdigest()[:12]}"
+        module: ModuleType = module_of(self.name, self.text)
         for entry, function in vars(module).items():
             if entry.startswith("joint_"):
                 setattr(self, entry.removeprefix("joint_"), function)
 
-    latched = property(lambda self: self._is("latched"))
-    bristled = property(lambda self: self._is("bristled"))
-    whole = property(lambda self: self._is("whole"))
-    largest = property(lambda self: self._is("largest"))
-    of = property(lambda self: "whole" if self.whole else "joints")
-
-    def _is(self, fact: str) -> int | None:
-        return 1 if fact in self.facts else None
-
     def __repr__(self) -> str:
         return f"<{self.title} {self.name}>"
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, InLanes) and self._made_of == other._made_of
-
-    def __hash__(self) -> int:
-        return hash(self._made_of)
-
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        return InLanes, self._made_of
+        return InLanes, (self.text, self.title, self.facts)
 
 
 @cache
