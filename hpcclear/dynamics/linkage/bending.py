@@ -186,28 +186,10 @@ def uniform_share(mass: Number, inertia: Number, length: Number, center: Number)
     return 2.0 * mass * inertia / (inertia + own + shifted + root)
 
 
-class Bar(NamedTuple):
-    """A bar's numbers, single ones or of samples (m,): kg, kg m2, m, mass centre from a in m, N m2, 1."""
-
-    mass: Number
-    inertia: Number
-    length: Number
-    center: Number
-    stiffness: Number
-    damping: Number
-
-
-def bar_of(body: Body) -> Bar:
-    """The bar that a body with bending is."""
-    assert body.bending is not None
-    length, center, bending = body.points["b"][0], body.center[0], body.bending
-    return Bar(body.mass, body.inertia, length, center, bending.stiffness, bending.damping)
-
-
-def numbers(bar: Bar, modes: int) -> dict[str, Number]:
-    """Values of `entries`, SI."""
-    share = uniform_share(bar.mass, bar.inertia, bar.length, bar.center)
-    length, c = bar.length, bar.center
+def numbers(bar: Body) -> dict[str, Number]:
+    """Values of `entries`, SI, single ones or of samples (m,), of a body with bending."""
+    bending, length, c = bar.bending, bar.points["b"][0], bar.center[0]
+    share, modes = uniform_share(bar.mass, bar.inertia, length, c), bending.modes
     density = share / length
     found: dict[str, Number] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
     found["most"] = SHORTEST * length
@@ -215,14 +197,14 @@ def numbers(bar: Bar, modes: int) -> dict[str, Number]:
     for i, a in wave.items():
         sign = -1.0 if i % 2 else 1.0
         lateral = density * (1.0 - sign) / a
-        rate = a * a * np.sqrt(bar.stiffness / density)  # rad/s, of the bar held at its ends
+        rate = a * a * np.sqrt(bending.stiffness / density)  # rad/s, of the bar held at its ends
         found |= {
             f"lateral_{i}": lateral,
             f"turned_{i}": -sign * density * length / a - c * lateral,
             f"nearer_{i}": 0.5 * a * a * length,
             f"slope_{i}": a,
-            f"stiffness_{i}": 0.5 * bar.stiffness * a**4 * length,
-            f"damping_{i}": bar.damping * rate * share,
+            f"stiffness_{i}": 0.5 * bending.stiffness * a**4 * length,
+            f"damping_{i}": bending.damping * rate * share,
         }
         for j in range(i, modes + 1):
             scale = density * a * wave[j]

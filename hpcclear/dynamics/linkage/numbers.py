@@ -59,7 +59,7 @@ def _bodies(trees: Forest, found: dict[str, Number]) -> None:
             f"{body.name}_offset_sin": np.sin(angle),
         }
         if body.bending is not None:
-            bent = bending.numbers(bending.bar_of(body), body.bending.modes)
+            bent = bending.numbers(body)
             found |= {f"{body.name}_bend_{entry}": value for entry, value in bent.items()}
         if trees.on_ground(body.name):
             own = body.points[split(trees.hangs[body.name].own)[1]]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.bending import bar_of, numbers
+from hpcclear.dynamics.linkage.bending import numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.planar.problem import driven_length, is_prescribed, linkage_of
 from hpcclear.laws.numbers import evaluate
@@ -62,7 +62,7 @@ def swings(mechanism: Mechanism) -> tuple[float, ...]:
     found: list[float] = []
     for body in mechanism.bodies:
         if body.bending is not None:
-            own = numbers(bar_of(body), body.bending.modes)
+            own = numbers(body)
             modes = range(1, body.bending.modes + 1)
             found += [float(np.sqrt(own[f"stiffness_{k}"] / own["mass"])) for k in modes]
     return tuple(found)
