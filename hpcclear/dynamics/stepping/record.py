@@ -12,17 +12,12 @@ from hpcclear.dynamics.layout.arguments import Counter
 JOINTS = at.MAX_JOINTS
 DRIVE_WORK = CONTACTS + 2 * JOINTS
 (ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, MEASURED) = range(DRIVE_WORK + 1, DRIVE_WORK + 5)
-MEASURES = np.array([
-    row + k
-    for row, size in (
-        (at.FORCE, JOINTS), (at.FORCE_SQUARES, JOINTS), (at.IMPACT_POWERS, JOINTS), (at.FLIGHTS, JOINTS),
-        (at.BEGUN, JOINTS), (at.FRAME_X, 1), (at.FRAME_Y, 1), (at.FRAME_SQUARE, 1),
-    )
-    for k in range(size)
+_FORCES = range(at.FORCE, at.FORCE + JOINTS)
+_PLACES = np.array([
+    k for k, one in enumerate(at.INTEGRATED) if one.rate in _FORCES or one.asked_by in ("impacts", "steps")
 ])  # fmt: skip
-"""Measures of impact and noise whose integrals stand in a row."""
+MEASURES = at.INTEGRATED_RATES[_PLACES]  # of impact and noise, whose integrals stand in a row
 STATE = MEASURED + len(MEASURES)
-_PLACES = np.array([at.place(int(rate)) for rate in MEASURES])
 
 
 def columns(n: int) -> int:
