@@ -62,22 +62,19 @@ def linkage_of(scene: Scene) -> Linkage:
 
 def _check_followed(scene: Scene, follow: str) -> None:
     """InputError where the objective is of something that is not followed."""
-    name, asks, point = scene.objective.name, scene.objective.asks, "." in follow
-    if "slider_acceleration_deviation" in asks and (point or not follow):
-        raise InputError(
-            scene.objective_key, name,
-            "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
-            'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
-        )  # fmt: skip
-    if "acceleration_x" in asks and not follow:
-        reason = "no body or point is followed, so there is no acceleration"
-        remedy = 'Name a point: mechanism.followed = "body.point"'
-        raise InputError(scene.objective_key, name, reason, remedy)
-    of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}
-    if asks & of_points and not point:
-        reason = "no point is followed"
-        remedy = 'Name it: mechanism.followed = "body.point"'
-        raise InputError(scene.objective_key, name, reason, remedy)
+    asks, point = scene.objective.asks, "." in follow
+    of_slider = "slider_acceleration_deviation" in asks
+    of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"} & asks
+    for wrong, reason, remedy in (
+        (of_slider and point, "this linkage has a followed point", 'Use "point-acceleration-deviation"'),
+        (of_slider and not follow, "no body of this linkage slides along a line of the ground",
+         'Use another one, such as "peak-contact-force"'),
+        ("acceleration_x" in asks and not follow, "no body or point is followed, so there is no acceleration",
+         'Name a point: mechanism.followed = "body.point"'),
+        (of_points and not point, "no point is followed", 'Name it: mechanism.followed = "body.point"'),
+    ):  # fmt: skip
+        if wrong:
+            raise InputError(scene.objective_key, scene.objective.name, reason, remedy)
 
 
 def _check_room(scene: Scene, others: int) -> None:
@@ -94,10 +91,8 @@ def _check_room(scene: Scene, others: int) -> None:
         reason = f"has three for each body: {most}"
         remedy = 'Write formulation = "minimal", or use fewer bodies'
         raise InputError("numerics.formulation", "baumgarte", reason, remedy)
-    bodies = len(scene.linkage.bodies)
-    raise InputError(
-        "mechanism.bodies", bodies, f"have {most}", "Use fewer bodies, joints with clearance or modes of bending"
-    )  # fmt: skip
+    remedy = "Use fewer bodies, joints with clearance or modes of bending"
+    raise InputError("mechanism.bodies", len(scene.linkage.bodies), f"have {most}", remedy)
 
 
 def guided(mechanism: Mechanism) -> str:
