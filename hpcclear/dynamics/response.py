@@ -256,7 +256,6 @@ class Collected(Heard):
         of_spectra = instants_of(scene, sample) if spectra or scene.bands() else 0
         super().__init__(scene, sample, count, of_spectra)
         self._parts: list[dict[str, Array]] = []
-        self._taken = 0
         self._kept, self._began = kept_revolutions(scene), 0.0
         self._revolutions: list[Array] = []
 
@@ -267,9 +266,8 @@ class Collected(Heard):
         seen, first = steps.seen_between(self.sample, piece, works=True), self.scene.bristles
         seen = seen._replace(q=seen.q[:, first:], v=seen.v[:, first:])
         series = {"time": piece.times, **planar.series(self.scene, self.sample.par, seen)}
-        if not self._taken:
+        if not self._parts:
             self._began = float(series["energy_residual"][0])
-        self._taken += len(piece.times)
         # copies: a column that is a view would keep all that was observed
         self._parts.append({name: one.copy() for name, one in series.items()})
         self._revolutions.append(piece.steps.revolution[piece.k])

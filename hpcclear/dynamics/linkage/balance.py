@@ -127,21 +127,15 @@ class Balance:
             if early == late:
                 total = total + _times(dot, rates)
                 continue
-            area = areas[early, late]
+            # by cosine and sine of the difference of the frames' angles
+            (c, s), (ct, st) = self.kinematics.trig(early), self.kinematics.trig(late)
             if dot:
-                total = total + _times(dot, rates) * self._cosine(early, late)
-            if area:
-                total = total + _times(area, rates) * self._sine(early, late)
+                cosine = self.writer.let(f"c_{early}_{late}", c * ct + s * st)
+                total = total + _times(dot, rates) * cosine
+            if area := areas[early, late]:
+                sine = self.writer.let(f"s_{early}_{late}", s * ct - c * st)
+                total = total + _times(area, rates) * sine
         return total
-
-    def _cosine(self, early: str, late: str) -> Term:
-        """Cosine of the difference of two frames' angles."""
-        (c, s), (ct, st) = self.kinematics.trig(early), self.kinematics.trig(late)
-        return self.writer.let(f"c_{early}_{late}", c * ct + s * st)
-
-    def _sine(self, early: str, late: str) -> Term:
-        (c, s), (ct, st) = self.kinematics.trig(early), self.kinematics.trig(late)
-        return self.writer.let(f"s_{early}_{late}", s * ct - c * st)
 
     # ---- forces ---------------------------------------------------------------------------------
     def force(self, column: Mover) -> Term:

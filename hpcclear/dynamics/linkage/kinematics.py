@@ -102,7 +102,6 @@ class Kinematics:
             return angle, speed, ZERO
         if drive.kind == "table":
             return self._tabulated(drive, frame)
-        assert drive.kind == "harmonic"
         entries = ("mean", "amplitude", "rate", "phase")
         mean, amplitude, rate, shift = (write.parameter(f"{drive.name}_{e}") for e in entries)
         phase = f"{rate.name} * time + {shift.name}"

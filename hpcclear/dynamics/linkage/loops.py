@@ -4,7 +4,6 @@ The terms are those of `closing.Closing`, evaluated by Python or, for many insta
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from itertools import chain, combinations
 from typing import Any, NamedTuple
 
@@ -52,12 +51,12 @@ def of_terms(
 def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], list[Array]]]:
     """What texts for numpy call for each table of angles: ``table_of_NAME(time)``, its `curves` at times of any shape, from
     the same pieces that the kernel reads."""
+
+    def reader(pieces: tuple[Pieces, ...]) -> Callable[[Array], list[Array]]:
+        return lambda time: [one.at(time) for one in pieces]
+
     tables = (drive for drive in mechanism.drives if drive.kind == "table")
-    return {f"table_of_{drive.name}": partial(_all_at, drive.pieces) for drive in tables}
-
-
-def _all_at(pieces: tuple[Pieces, ...], time: Array) -> list[Array]:
-    return [one.at(time) for one in pieces]
+    return {f"table_of_{drive.name}": reader(drive.pieces) for drive in tables}
 
 
 class State(NamedTuple):

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Protocol
 
-from hpcclear.base.terms import ONE, ZERO, Term, Vector, named
+from hpcclear.base.terms import NOWHERE, ONE, ZERO, Term, Vector, named
 from hpcclear.dynamics.linkage.balance import Balance
 from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
@@ -172,7 +172,7 @@ class RubbingPin(Rubbing):
             rows = [self.rows[f"{self.joint.name}_{axis}"] for axis in "xy"]
             return [(ZERO, {row: ONE}) for row in rows]
         balance, kin = self.of.balance, self.of.balance.kinematics
-        rest = Vector(ZERO, ZERO)
+        rest = NOWHERE
         slopes: dict[int, Vector] = {}
         for body in kin.forest.mechanism.bodies:
             if body.name not in self.beyond:
@@ -185,7 +185,7 @@ class RubbingPin(Rubbing):
             for column, held in kin.columns(center).items():
                 if column in self.number:
                     k, part = self.number[column], kin.rotated(*held).times(mass)
-                    slopes[k] = slopes.get(k, Vector(ZERO, ZERO)) + part
+                    slopes[k] = slopes.get(k, NOWHERE) + part
         for pull in balance.pulls:
             if split(pull.place)[0] in self.beyond:
                 rest = rest - pull.force

@@ -227,8 +227,6 @@ def labels(scene: Scene, mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     return {"body": bodies, "point": points}
 
 
-Path = Callable[[Array], Array]
-
 INSTANTS = 720
 """Of a turn at which the linkage without clearance is put together; cubic between them, which is off by 1e-11 of its size."""
 
@@ -258,7 +256,7 @@ def followed(
 
 
 @lru_cache(maxsize=16)
-def _ideal_path(scene: Scene, place: str) -> Path | None:
+def _ideal_path(scene: Scene, place: str) -> Callable[[Array], Array] | None:
     """Where a place of the linkage is without clearance: complex m of the share of a revolution (t,); None where its drives
     leave something free then or do not repeat, or it cannot pass a dead centre."""
     try:

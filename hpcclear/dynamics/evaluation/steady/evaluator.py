@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,17 +32,17 @@ TURN_SECONDS = 0.02  # how long one set of lanes works before the next one does
 Procedure = Callable[[Sample], Generator[Segment, Outcome, Mean]]
 
 
+@dataclass
 class _Ask:
     """A design's procedure, the segment it waits for, and what of that has come in."""
 
-    def __init__(
-        self, sample: int, values: Array, par: Array, asking: Generator[Segment, Outcome, Mean]
-    ) -> None:
-        self.sample = sample
-        self.values = values
-        self.par = par
-        self.asking = asking
-        self.segment = next(asking)
+    sample: int
+    values: Array
+    par: Array
+    asking: Generator[Segment, Outcome, Mean]
+
+    def __post_init__(self) -> None:
+        self.segment = next(self.asking)
         self._rows: dict[int, Array] = {}
 
     def take(self, copy: int, row: Array) -> Mean | None:

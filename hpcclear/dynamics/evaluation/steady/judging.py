@@ -21,10 +21,8 @@ DRIFT = 3.5  # standard errors of a drift, or of a difference between tolerances
 
 def objective(gaps: Array) -> Array:
     """f (eq. 13), m, from mean gaps of all joints, m: shape (..., joints) to (...)."""
-    total: Array = np.abs(gaps[..., 0])
-    for k in range(1, gaps.shape[-1]):
-        total = np.hypot(total, gaps[..., k])  # by 0 it stays what it is, to the last bit
-    return total
+    found: Array = np.hypot.reduce(gaps, axis=-1)  # by 0 it stays what it is, to the last bit
+    return found
 
 
 @dataclass(frozen=True)
