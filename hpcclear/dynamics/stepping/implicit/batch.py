@@ -5,6 +5,7 @@ revolutions, sums, outcome) is the block stepper's: the implicit step leaves its
 step would. A sample keeps its column of the eight for as long as it is stiff, and none depends on what its neighbours hold.
 """
 
+import math
 from functools import cache
 
 from hpcclear.base.bits import call_at, carray
@@ -41,7 +42,7 @@ def begin_function(latched, m, f):
 def begin_kinks(rules, m):
     """Keep the kink functions where steps begin; what was learnt before one has changed its sign is forgotten."""
     put(m, mem.NOW, spread(0.0))
-    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
+    for f in range(mem.KINKS_A_JOINT * rules.begin, mem.KINKS_A_JOINT * rules.end):
         begin_function(rules.latched, m, f)
     for i in range(COLUMNS):
         if m[mem.NOW * COLUMNS + i] > 0.0:
@@ -108,7 +109,7 @@ def first_guess(moved, W, work, m):
 def show_kinks(rules, m):
     """Where one of the stages lies beyond a kink, to mem.SHOWN: below 0."""
     shown = spread(1.0)
-    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
+    for f in range(mem.KINKS_A_JOINT * rules.begin, mem.KINKS_A_JOINT * rules.end):
         start = fetch(m, mem.START_KINKS + f)
         for s in range(STAGES):
             shown = newton.least(shown, start * fetch(m, mem.STAGE_KINKS + s * ALL_KINKS + f))
@@ -125,7 +126,7 @@ def kink_fraction(rules, m, i, beyond):
     first = 2.0
     if not m[mem.SHOWN * COLUMNS + i] < 0.0:
         return first
-    for f in range(kinks.first_function(rules), kinks.after_functions(rules)):
+    for f in range(mem.KINKS_A_JOINT * rules.begin, mem.KINKS_A_JOINT * rules.end):
         start = m[(mem.START_KINKS + f) * COLUMNS + i]
         one = m[(mem.STAGE_KINKS + f) * COLUMNS + i]
         two = m[(mem.STAGE_KINKS + ALL_KINKS + f) * COLUMNS + i]
@@ -179,7 +180,7 @@ def norms_of_jacobians(n, m):
     put(m, mem.NORM // COLUMNS, by_v)
     put(m, mem.NOW, by_q)
     for i in range(COLUMNS):
-        m[mem.NORM + i] += control.root_of(m[mem.NOW * COLUMNS + i])
+        m[mem.NORM + i] += math.sqrt(m[mem.NOW * COLUMNS + i])
 
 
 @scalar_function
@@ -239,7 +240,7 @@ def end_column(effects, moved, lane, W, work, m, i):
     total = m[mem.NOW * COLUMNS + i] + columns.gap_errors(effects.rules, lane, W, work, m, i)
     columns.leave(effects, moved.n, lane, W, work, m, i)
     mean = total * (0.5 / moved.n)
-    m[mem.TRIED_ERROR + i] = control.root_of(mean)
+    m[mem.TRIED_ERROR + i] = math.sqrt(mean)
     work[at.ERROR * W + lane] = mean
     control.propose(lane, W, work, m, i, iterations)
 

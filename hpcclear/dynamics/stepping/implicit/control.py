@@ -93,12 +93,6 @@ def fit_to_ramp(par, lane, W, m, i, settings):
 
 
 @lane_function
-def root_of(number):
-    """Square root of one number."""
-    return math.sqrt(number)
-
-
-@lane_function
 def forget(m, i):
     """Nothing is known of earlier steps: the lane comes from the explicit method or is new."""
     for number in (

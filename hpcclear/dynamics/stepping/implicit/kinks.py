@@ -24,12 +24,6 @@ GAP_UNIT = 0.1
 
 
 @lane_function
-def entry(m, p, entry):
-    """A parameter of joint p in all lanes."""
-    return fetch(m, mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry)
-
-
-@lane_function
 def kinks_of_joint(rules, m, p, row):
     """The four functions of joint p at the states of all lanes, into rows from `row` on; 0 where no kink can be felt."""
     gap = fetch(m, at.RATE_NOW + at.GAP + p)
@@ -42,7 +36,8 @@ def kinks_of_joint(rules, m, p, row):
     put(m, row, factor)
     put(m, row + 1, above(factor, low, nothing))
     put(m, row + 2, above(factor, high, nothing))
-    put(m, row + 3, touching / (GAP_UNIT * entry(m, p, at.CLEARANCE)))
+    clearance = fetch(m, mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE)
+    put(m, row + 3, touching / (GAP_UNIT * clearance))
 
 
 @scalar_function
@@ -51,18 +46,6 @@ def kink_functions(rules, m, first):
     for joint in range(rules.begin, rules.end):
         p = place(joint)
         kinks_of_joint(rules, m, p, first + mem.KINKS_A_JOINT * p)
-
-
-@lane_function
-def first_function(rules):
-    """The first of the open joints' functions."""
-    return mem.KINKS_A_JOINT * rules.begin
-
-
-@lane_function
-def after_functions(rules):
-    """What comes after the last of them."""
-    return mem.KINKS_A_JOINT * rules.end
 
 
 @lane_function
