@@ -92,9 +92,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     radius = less(effects.waves, par[(block + at.JOURNAL_RADIUS) * W + i], here.journal)
     arm_journal = radius - 0.5 * depth
     across = vy * nx - vx * ny
-    sliding = (
-        across + forces.swept(spin_journal, arm_journal) - forces.swept(spin_bearing, arm_bearing)
-    )
+    ahead = across + forces.swept(spin_journal, arm_journal)
+    sliding = ahead - forces.swept(spin_bearing, arm_bearing)
     rubs = effects.friction
     tangential = forces.tangential_force(effects, work, par, joint, sliding, normal, i, W)
     fx = normal * nx - forces.product(rubs, tangential, ny)

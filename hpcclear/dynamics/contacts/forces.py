@@ -91,9 +91,9 @@ def store_impacts(effects, work, par, joint, touch, normal, i, W):
     """Write down what measures of impact are made of; the contact's force stands in its row already, a film's with it."""
     if effects.impacts is not None:
         force = work[(at.RATE_NOW + joint.force) * W + i]
-        work[(at.RATE_NOW + joint.force_square) * W + i] = force * force
+        work[(at.RATE_NOW + at.FORCE_SQUARES + joint.place) * W + i] = force * force
         lost_now = damped(effects, work, par, joint, touch, normal, i, W)
-        work[(at.RATE_NOW + joint.impact_power) * W + i] = lost_now
+        work[(at.RATE_NOW + at.IMPACT_POWERS + joint.place) * W + i] = lost_now
 
 
 @lane_function
@@ -112,7 +112,7 @@ def store_contact(effects, work, par, joint, felt, i, W):
     store_impacts(effects, work, par, joint, touch, normal, i, W)
     store_kinks(effects, work, par, joint, touch, i, W)
     wearing = force_that_wears(effects.threshold, par, joint, normal, i, W)
-    store_rate(effects.wear, work, joint.sliding_power, wearing * abs(sliding), i, W)
+    store_rate(effects.wear, work, at.SLIDING_POWERS + joint.place, wearing * abs(sliding), i, W)
 
 
 @lane_function
@@ -124,11 +124,11 @@ def store_kinks(effects, work, par, joint, touch, i, W):
         inverse_impact = work[joint.inverse_impact * W + i]
         row = joint.block + at.CONTACT_NUMBERS
         cut = effects.contact.kink(par, row, depth, rate, inverse_impact, active, i, W)
-        work[(at.RATE_NOW + joint.force_kink) * W + i] = cut
+        work[(at.RATE_NOW + at.FORCE_KINKS + joint.place) * W + i] = cut
         row = joint.block + at.FRICTION_NUMBERS
         low, high = sides_of(effects.friction, par, row, sliding, i, W)
-        work[(at.RATE_NOW + joint.low_kink) * W + i] = low
-        work[(at.RATE_NOW + joint.high_kink) * W + i] = high
+        work[(at.RATE_NOW + at.LOW_KINKS + joint.place) * W + i] = low
+        work[(at.RATE_NOW + at.HIGH_KINKS + joint.place) * W + i] = high
 
 
 @lane_function

@@ -42,31 +42,25 @@ def counted(waves):
 
 @lane_function
 def depth_and_slope(count, par, row, cosine, sine, i, W):
-    """Sum of `count` waves at an angle, m, and its derivative, m/rad.
+    """Sum of `count` waves at an angle, m, and its derivative, m/rad; 0 of a round surface.
 
     From `row` on of each wave the factors of its cosine and sine, then those of the derivative's. By
     cos (n+1) x = 2 cos x cos n x - cos (n-1) x, and likewise of sines.
     """
-    c, c_before = cosine, 1.0
-    s, s_before = sine, 0.0
-    twice = cosine + cosine
-    depth = par[row * W + i] * c + par[(row + 1) * W + i] * s
-    slope = par[(row + 2) * W + i] * c + par[(row + 3) * W + i] * s
-    for n in written_out(HIGHER):
-        if n < count:
-            c, c_before = twice * c - c_before, c
-            s, s_before = twice * s - s_before, s
-            wave = row + 4 * n
-            depth += par[wave * W + i] * c + par[(wave + 1) * W + i] * s
-            slope += par[(wave + 2) * W + i] * c + par[(wave + 3) * W + i] * s
-    return depth, slope
-
-
-@lane_function
-def waves_at(flag, par, row, cosine, sine, i, W):
-    """`depth_and_slope` of a surface that is out of round, 0 of a round one."""
-    if flag is not None:
-        return depth_and_slope(flag, par, row, cosine, sine, i, W)
+    if count is not None:
+        c, c_before = cosine, 1.0
+        s, s_before = sine, 0.0
+        twice = cosine + cosine
+        depth = par[row * W + i] * c + par[(row + 1) * W + i] * s
+        slope = par[(row + 2) * W + i] * c + par[(row + 3) * W + i] * s
+        for n in written_out(HIGHER):
+            if n < count:
+                c, c_before = twice * c - c_before, c
+                s, s_before = twice * s - s_before, s
+                wave = row + 4 * n
+                depth += par[wave * W + i] * c + par[(wave + 1) * W + i] * s
+                slope += par[(wave + 2) * W + i] * c + par[(wave + 3) * W + i] * s
+        return depth, slope
     return 0.0, 0.0
 
 
@@ -81,10 +75,9 @@ def waves_here(effects, par, joint, relative, normal, turns, i, W):
         other = (nx * cj + ny * sj, ny * cj - nx * sj)
         bearing, journal = counted(effects.bearing_waves), counted(effects.journal_waves)
         first = at.WAVES + 4 * (bearing + journal) * joint.place
-        deep, slope = waves_at(effects.bearing_waves, par, first, own[0], own[1], i, W)
-        shallow, rise = waves_at(
-            effects.journal_waves, par, first + 4 * bearing, other[0], other[1], i, W
-        )
+        deep, slope = depth_and_slope(effects.bearing_waves, par, first, own[0], own[1], i, W)
+        first = first + 4 * bearing
+        shallow, rise = depth_and_slope(effects.journal_waves, par, first, other[0], other[1], i, W)
         turning = (vy * nx - vx * ny) * inverse
         widening = slope * (turning - spin_bearing) + rise * (turning - spin_journal)
         return Here(deep, shallow, slope, rise, widening, own, other)

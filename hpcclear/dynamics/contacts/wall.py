@@ -30,10 +30,8 @@ def wall_force(effects, work, par, joint, relative, touching, i, W):
     normal = forces.normal_force(effects, work, par, joint, depth, rate, i, W)
     arm_journal = radius - 0.5 * depth
     arm_bearing = half + 0.5 * depth
-    along = vy * nx - vx * ny
-    sliding = (
-        along + forces.swept(spin_journal, arm_journal) - forces.swept(spin_bearing, arm_bearing)
-    )
+    along = vy * nx - vx * ny + forces.swept(spin_journal, arm_journal)
+    sliding = along - forces.swept(spin_bearing, arm_bearing)
     tangential = forces.tangential_force(effects, work, par, joint, sliding, normal, i, W)
     rubs = effects.friction
     touch, pushes = (depth, rate, sliding), (normal, tangential)

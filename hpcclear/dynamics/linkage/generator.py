@@ -217,7 +217,7 @@ class _Generator(MotionEquations):
         for k in range(1 if whole else len(self.mechanism.contacts)):
             row = self.rows.rates + at.OBJECTIVE_RATES
             joint = "None" if whole else f"joints[{k}]"
-            where = f"{row}" if whole else f"({self.rows.rates} + joints[{k}].objective_rate)"
+            where = f"{row}" if whole else f"({row} + joints[{k}].place)"
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 

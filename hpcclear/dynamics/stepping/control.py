@@ -228,8 +228,7 @@ def count_contact(work, p, i, W):
     d1 = work[(at.RATE_NOW + at.GAP + p) * W + i]
     inside = no_less(d0, 0.0) + no_less(d1, 0.0)
     share = 1.0 - inside / (abs(d0) + abs(d1) + 1e-300)
-    flown = work[(at.INTEGRAL + at.FLIGHTS + p) * W + i] + work[at.STEP * W + i] * share
-    keep(work, at.INTEGRAL + at.FLIGHTS + p, flown, yes, i, W)
+    add_integral(work, at.FLIGHTS + p, share, yes, i, W)
     touches = 1.0 if d1 > 0.0 else 0.0
     begins = touches if work[(at.TOUCHES + p) * W + i] == 0.0 else 0.0
     begun = work[(at.INTEGRAL + at.BEGUN + p) * W + i] + begins
