@@ -54,17 +54,13 @@ class View:
     """Rows of numbers, shape (..., `size`). Raises ValueError if the rows have another length."""
 
     size: int
+    most = 0  # length of a row where it may be longer
 
     def __init__(self, rows: Array) -> None:
-        if not self.fits(rows.shape[-1]):
+        if not self.size <= rows.shape[-1] <= max(self.size, self.most):
             name = type(self).__name__
             raise ValueError(f"a row of {name} holds {self.size} numbers, not {rows.shape[-1]}")
         self.rows = rows
-
-    @classmethod
-    def fits(cls, size: int) -> bool:
-        """Whether a row may have that length."""
-        return size == cls.size
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -218,12 +214,7 @@ class RunSettings(View):
 class Parameters(View):
     """Parameters of samples, SI; a linkage has rows of its own behind these."""
 
-    size = at.OWN
-
-    @classmethod
-    def fits(cls, size: int) -> bool:
-        """Whether a row may have that length."""
-        return cls.size <= size <= at.PARAMETERS
+    size, most = at.OWN, at.PARAMETERS
 
     speed = Column(at.SPEED)
     period = Column(at.PERIOD)

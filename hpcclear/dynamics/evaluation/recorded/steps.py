@@ -81,14 +81,11 @@ class Recorded:
 
     def first_row(self) -> Array:
         """The row (1, columns) of the start."""
-        n = self.problem.coordinates
+        n, start, none = self.problem.coordinates, self._start, np.zeros(1)
+        accelerations = self.observe(start.state(n), start.contacts, none, none)[0]
         row = np.zeros((1, rec.columns(n)))
-        contacts = slice(rec.CONTACTS, rec.DRIVE_WORK)
-        row[0, contacts] = self._start[0].contacts
-        row[0, rec.STATE : rec.STATE + 2 * n] = self._start[0].state(n)
-        states = row[:, rec.STATE : rec.STATE + 2 * n]
-        none = np.zeros(1)
-        row[:, rec.STATE + 2 * n :] = self.observe(states, row[:, contacts], none, none)[0]
+        row[:, rec.CONTACTS : rec.DRIVE_WORK] = start.contacts
+        row[:, rec.STATE :] = np.hstack([start.state(n), accelerations])
         return row
 
 
