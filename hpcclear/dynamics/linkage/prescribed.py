@@ -14,6 +14,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, coordinates, placed
 from hpcclear.dynamics.linkage.expression import On, Rows
@@ -23,11 +24,11 @@ from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, places_of, split
-from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
+from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Ended, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses
 
-Curves = Mapping[str, Callable[[Array], Array]]
-"""Tabulated loads by name, each as a function of the angle (t,), rad, or time (t,), s, that it goes by."""
+Curves = Mapping[str, Pieces]
+"""Tabulated loads by name, over the angle, rad, or time, s, that each goes by."""
 
 DIVERGING = 1e-6
 """Force times distance from a change point, rad of the drive, over the largest force further off, from which on it has no
@@ -100,7 +101,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
     found = walked(loops, start, main.seconds, main.turns, rounds)
     for change in found.changes:
         if freedom(mechanism) == 0 and _diverges(assembly, found, change, gravity):
-            found.end(Status.NEAR_SINGULAR, change)
+            found.ended = Ended(Status.NEAR_SINGULAR, change)
             break
     return found
 
@@ -236,7 +237,7 @@ def _reactions(
         body = getattr(load, "angle_of", None) or mechanism.period.body
         turned = assembly.loops.forest.index("angle", body)  # every body turns by itself here
         place = times if load.seconds else work[turned]
-        work[curves[load.name]] = tabulated.get(load.name, np.ones_like)(place)
+        work[curves[load.name]] = tabulated[load.name].at(place) if load.name in tabulated else 1.0
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     on_arrays(mechanism, text.source, **text.functions)(None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}

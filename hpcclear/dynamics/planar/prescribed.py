@@ -1,6 +1,5 @@
 """Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -51,11 +50,11 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
         try:
             mechanism = mechanism_of(one.linkage)
             times = np.linspace(0.0, mechanism.period.seconds, PER_REVOLUTION, endpoint=False)
-            held = prescribed_motion(mechanism, times, one.effects.gravity, _curves(one))
+            held = prescribed_motion(mechanism, times, one.effects.gravity, curves_of(one))
             rows = passings(one, mechanism, np.append(times, mechanism.period.seconds))
             largest = 0.0
             if len(rows):
-                peaks = prescribed_motion(mechanism, rows, one.effects.gravity, _curves(one))
+                peaks = prescribed_motion(mechanism, rows, one.effects.gravity, curves_of(one))
                 largest = float(np.abs(peaks.holds[f"{mechanism.period.name}_angle"]).max())
         except InputError:
             continue
@@ -64,11 +63,6 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
         deviation = float(np.std(acceleration))
         found[row] = np.abs(moment).max(), deviation, np.abs(acceleration).max()
     return found
-
-
-def _curves(scene: Scene) -> dict[str, Callable[[Array], Array]]:
-    """Tabulated loads by name, each as a function of the angle or time that it goes by."""
-    return {name: curve.at for name, curve in curves_of(scene).items()}
 
 
 def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
@@ -173,7 +167,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     edges = np.union1d(times, passings(scene, mechanism, times))
     inside = (edges[:-1, None] + np.diff(edges)[:, None] * _NODES).ravel()
     every = np.sort(np.concatenate([edges, inside]))
-    dense = prescribed_motion(mechanism, every, gravity, _curves(scene))
+    dense = prescribed_motion(mechanism, every, gravity, curves_of(scene))
     shown = np.searchsorted(edges, times)
     found = dense.at(times, lambda values: values[shown * (1 + len(_NODES))])
     poses = Poses(found.assembly.loops.forest, {}, 0)
