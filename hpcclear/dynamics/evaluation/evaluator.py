@@ -134,9 +134,8 @@ class Evaluator:
             for k in range(self._copies):
                 self._values.update(zip((labels + k).tolist(), points, strict=True))
         if self._copies > 1:
-            par, start, labels = with_copies(
-                par, start, labels, self.scene.numerics.rtol, self._perturbations
-            )
+            rtol = self.scene.numerics.rtol
+            par, start, labels = with_copies(par, start, labels, rtol, self._perturbations)
         if self._problem.effects.energies and self._problem.coordinates:
             before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
@@ -206,10 +205,10 @@ def responses_reported(problem: Problem) -> tuple[str, ...]:
     """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
     if not problem.effects.responses:
         return ()
-    linkage, impacts = problem.linkage, impacts_reported(problem)
-    if linkage.follow and not linkage.follows_a_point:
+    follow, impacts = problem.linkage.follow, impacts_reported(problem)
+    if follow and "." not in follow:
         return (*impacts, *(name for name in RESPONSES if "point" not in name))
-    followed = "point" if linkage.follows_a_point else "nothing"
+    followed = "point" if follow else "nothing"
     names = (name for name in RESPONSES if followed in name or "acceleration" not in name)
     return (*impacts, *names)
 

@@ -1,6 +1,7 @@
 """What loads and geometries of contact may use of the motion that they are written into (`base.terms`), written into a text."""
 
 from collections.abc import Callable, Mapping, Sized
+from dataclasses import dataclass
 
 from hpcclear.base.terms import ZERO, Acting, Term, Touching, Vector, named
 from hpcclear.dynamics import layout as at
@@ -11,17 +12,16 @@ from hpcclear.dynamics.linkage.kinematics import Kinematics
 from hpcclear.dynamics.linkage.parts import Contact
 
 
+@dataclass
 class LoadWriter(Acting):
     """The terms of one load."""
 
-    def __init__(
-        self, load: str, kinematics: Kinematics, writer: Writer, balance: Balance,
-        curve: Callable[[str], Term], places: Mapping[str, int],
-    ) -> None:  # fmt: skip
-        self._load, self._kinematics, self._writer, self._balance = (
-            load, kinematics, writer, balance,
-        )  # fmt: skip
-        self._curve, self._places = curve, places
+    _load: str
+    _kinematics: Kinematics
+    _writer: Writer
+    _balance: Balance
+    _curve: Callable[[str], Term]
+    _places: Mapping[str, int]
 
     def parameter(self, entry: str) -> Term:
         """Named ``LOAD_ENTRY``."""

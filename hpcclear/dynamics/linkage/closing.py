@@ -101,7 +101,7 @@ class Closing:
             found = found - kin.rotated(frame, arm.times(spin, spin))
         for move in point.moves:
             if move.turns_along:
-                speed = named(kin.speed_name((move.kind, move.body, "")))
+                speed = named(kin.speed_name((move.kind, move.body)))
                 rate = named("2.0") * speed * kin.spin(move.frame)
                 found = found + kin.rotated(move.frame, move.direction.times(rate).across())
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
@@ -136,9 +136,8 @@ class Closing:
         tilted = s * along.x - c * along.y  # of the angle between body and line
         angles = {Mover("angle", own): ONE, Mover("angle", other): -ONE}
         angles = {column: term for column, term in angles.items() if column.body != GROUND}
-        return [across, self._row(
-            f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted
-        )]  # fmt: skip
+        angle = self._row(f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted)
+        return [across, angle]
 
     def sliding(self, joint: Joint) -> tuple[dict[Mover, Term], Term]:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""

@@ -95,19 +95,18 @@ class MotionEquations:
 
     def torque(self, drive: Drive) -> tuple[Mover, Term]:
         """What a drive exerts, and along which column."""
-        write = self.writer
+        write, frame = self.writer, self.forest.frames[drive.body]
+        column, speed = Mover("angle", frame), self.kinematics.spin(frame)
         for name, rows in drive.straight.items():
-            speed = self.kinematics.spin(self.forest.frames[drive.body])
             torque = write.table(name, len(rows), speed, self.rows.places.get(name))
-            return Mover("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
+            return column, write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
             torque = write.let(drive.name, torque * self.turned(drive.name))
         if drive.no_load_speed is not None:
-            speed = self.kinematics.spin(self.forest.frames[drive.body])
             fall = write.parameter(f"{drive.name}_fall") * speed
             torque = write.let(f"{drive.name}_falling", torque * (ONE - fall))
-        return Mover("angle", self.forest.frames[drive.body]), torque
+        return column, torque
 
     # ---- accelerations --------------------------------------------------------------------------
     def inverse(self, term: Term) -> Term | None:

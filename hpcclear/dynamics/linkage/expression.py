@@ -120,21 +120,18 @@ class Writer:
         self._taken.add(candidate)
         return candidate
 
-    def called(self, function: Callable[..., object]) -> str:
-        """The name by which lines call a function that is not one of `elements`."""
-        known = (name for name, one in self.functions.items() if one is function)
-        if (name := next(known, None)) is None:
-            self.functions[name := self.fresh(function.__name__)] = function
-        return name
-
     def call(
         self, function: Callable[..., object] | str, terms: Iterable[Term], results: Iterable[str]
     ) -> tuple[Term, ...]:
         """A statement that calls a function, one of `elements` by its name; what it returns, by names like these."""
         texts = [self.text(term) for term in terms]
         made = [self.fresh(name) for name in results]
-        known = function if isinstance(function, str) else self.called(function)
-        self.line(f"{', '.join(made)} = {known}({', '.join(texts)})")
+        if not isinstance(function, str):
+            known = (name for name, one in self.functions.items() if one is function)
+            name = next(known, None) or self.fresh(function.__name__)
+            self.functions[name] = function
+            function = name
+        self.line(f"{', '.join(made)} = {function}({', '.join(texts)})")
         return tuple(map(named, made))
 
     def store(self, row: int, term: Term) -> None:

@@ -24,8 +24,8 @@ class Linkage:
     """A mechanism's structure: what its texts hold and where. Numbers that are zero in it are zero in every sample.
 
     `on`: what all its texts have; `cartesian`: every body by itself, with multipliers and feedback; `bristles`: of friction in
-    the joints with clearance, whose coordinates come before the mechanism's; `places`: of the contacts among the kernel's.
-    Raises InputError if it needs more parameters than the kernel holds.
+    the joints with clearance, whose coordinates come before the mechanism's; `places`: of the contacts among the kernel's;
+    `parameter_rows`: of a sample. Raises InputError if it needs more parameters than the kernel holds.
     """
 
     def __init__(
@@ -36,23 +36,24 @@ class Linkage:
         self.cartesian, self.follow = cartesian, on.follow
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
-        self._free = at.OWN
+        self.parameter_rows = at.OWN
         # has the rows of all others
         self._whole = self._text(_with_impacts(self._on)._replace(pins=True))
-        self.poses = Poses(self.forest, self._given, self._free)
+        self.poses = Poses(self.forest, self._given, self.parameter_rows)
         self._take(self.poses.rows)
         bars = [body for body in mechanism.bodies if body.bending is not None]
         masses = [f"{b.name}_{part}" for b in mechanism.bodies for part in ("mass", "inertia")]
         masses += [f"{b.name}_bend_{part}" for b in bars for part in entries(b.bending.modes)]
         for name in masses:
             if name not in self._given:
-                self._take({name: self._free})
+                self._take({name: self.parameter_rows})
         count = sum(joint.kind == "revolute" for joint in mechanism.joints)
         if count > at.MAX_PINS:
             reason = f"more than {at.MAX_PINS} pins without clearance"
             raise InputError("mechanism.joints", count, reason, "Use fewer bodies")
-        if self._free > at.WAVES:
-            reason = f"need {self._free - at.OWN} parameters, more than {at.WAVES - at.OWN}"
+        needed, most = self.parameter_rows - at.OWN, at.WAVES - at.OWN
+        if needed > most:
+            reason = f"need {needed} parameters, more than {most}"
             remedy = "Use fewer bodies or points"
             raise InputError("mechanism.bodies", len(mechanism.bodies), reason, remedy)
 
@@ -61,7 +62,7 @@ class Linkage:
         if on not in self._texts:
             first = at.RATE_NOW + at.PLACES + len(self.curve_rows)
             places = {name: first + k for k, name in enumerate(self.straight)}
-            given, free, curves = self._given, self._free, self.curve_rows
+            given, free, curves = self._given, self.parameter_rows, self.curve_rows
             rows = Rows(parameters=given, free=free, curves=curves, places=places)
             rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
@@ -73,7 +74,7 @@ class Linkage:
 
     def _take(self, rows: dict[str, int]) -> None:
         self._given |= rows
-        self._free = max([self._free, *(row + 1 for row in rows.values())])
+        self.parameter_rows = max([self.parameter_rows, *(row + 1 for row in rows.values())])
 
     @cached_property
     def forest(self) -> Forest:
@@ -84,16 +85,6 @@ class Linkage:
     def loops(self) -> Loops:
         """The constraints of its Cartesian bodies."""
         return Loops(self.mechanism)
-
-    @property
-    def follows_a_point(self) -> bool:
-        """Whether it is a point that responses follow."""
-        return "." in self.follow
-
-    @property
-    def parameter_rows(self) -> int:
-        """Parameters of a sample."""
-        return self._free
 
     @cached_property
     def curve_rows(self) -> dict[str, int]:

@@ -67,10 +67,6 @@ class Passage:
     ended: Ended | None = None
     recurs: float = math.inf
 
-    def end(self, status: Status, node: WalkPose) -> None:
-        """Let it end at a pose."""
-        self.ended = Ended(status, node)
-
     def at(self, times: Array) -> tuple[Array, Array]:
         """Coordinates and velocities (n, t) at instants (t,), s, before the walk's end and not beside a change point."""
         rounds = np.maximum(np.floor(times / self.recurs), 0.0)  # 0 where it does not recur
@@ -240,7 +236,8 @@ def walked(loops: Loops, start: Array, period: float, turns: int, rounds: int) -
     walker, found = _Walker(loops, unit), Passage(loops, unit)
     here = walker.pose(start, 0.0)
     if here is None:
-        found.end(Status.CANNOT_TURN, WalkPose(0.0, start, np.zeros(loops.size), 0.0, 0.0))
+        nowhere = WalkPose(0.0, start, np.zeros(loops.size), 0.0, 0.0)
+        found.ended = Ended(Status.CANNOT_TURN, nowhere)
         return found
     found.nodes.append(here)
     for count in range(1, min(rounds, MOST_ROUNDS) + 1):
@@ -286,7 +283,7 @@ def _through(walker: _Walker, found: Passage, here: WalkPose, end: float) -> Wal
             h *= 0.5
             if h < SHORTEST * unit:
                 fast = np.abs(here.v / walker.loops.scales).max(initial=0.0) * unit > FAST
-                found.end(Status.CANNOT_TURN if fast else Status.NEAR_SINGULAR, here)
+                found.ended = Ended(Status.CANNOT_TURN if fast else Status.NEAR_SINGULAR, here)
                 return here
             continue
         new, off = step

@@ -16,7 +16,7 @@ from hpcclear.dynamics.linkage.assembly import Assembly, assemble, ideal_rows, s
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import Joint, is_loose
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
+from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Ended, Passage, WalkPose
 from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
 from hpcclear.scene.driving import FreeDriving, PlanarSpeed
 
@@ -35,16 +35,15 @@ NEAR_CHANGE = 0.1  # of a change point, rad of the drive: poses nearer to it are
 
 def without_clearance(mechanism: Mechanism) -> Mechanism:
     """The mechanism with pins in place of clearances, and a drive of constant speed in place of a torque."""
-    entries = ("name", "body", "period", "turns")
-    drives: Any = tuple(
-        PlanarSpeed.model_construct(
-            kind="constant-speed", speed=d.usual_speed, **{one: getattr(d, one) for one in entries}
-        )
-        if isinstance(d, FreeDriving)
-        else d
-        for d in mechanism.drives
-    )
-    return replace(mechanism, joints=pinned(mechanism), drives=drives, loads=())
+    drives: list[Any] = []
+    for drive in mechanism.drives:
+        if isinstance(drive, FreeDriving):
+            kept = {one: getattr(drive, one) for one in ("name", "body", "period", "turns")}
+            kept |= {"kind": "constant-speed", "speed": drive.usual_speed}
+            drives.append(PlanarSpeed.model_construct(**kept))
+        else:
+            drives.append(drive)
+    return replace(mechanism, joints=pinned(mechanism), drives=tuple(drives), loads=())
 
 
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
@@ -95,7 +94,7 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:
                 found.ended = None  # it may swing; and inertia carries it past a change point
         narrow = _narrowest(found)
         if narrow is not None and (found.ended is None or found.ended.node.time > narrow.time):
-            found.end(Status.NEAR_SINGULAR, narrow)
+            found.ended = Ended(Status.NEAR_SINGULAR, narrow)
         return assembly, found
     found = passage_of(assembly, MOST_ROUNDS)
     singular = list(found.changes)
@@ -104,7 +103,7 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:
         found.ended = None
     for node in singular:
         if _dependent(mechanism, assembly, found, node):
-            found.end(Status.NEAR_SINGULAR, node)
+            found.ended = Ended(Status.NEAR_SINGULAR, node)
             break
     return assembly, found
 

@@ -249,12 +249,13 @@ def _share_that_wears(scene: Scene, get: Numbers, joint: str) -> Array:
 def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
     """First row of a joint's waves among `layout.WAVE_ROWS`, and how many. Raises InputError if there are more than rows."""
     rows = 2 * sum(scene.waves().values())
-    first = rows * _place(scene, joint)
+    place = scene.joint_labels.index(joint)
+    first = rows * place
     if first + rows > at.WAVE_ROWS:
         raise InputError(
             "wear.harmonics" if scene.wear is not None and scene.wear.waves else f"{scene.joint_key(joint)}.out_of_round",
             rows // 2, f"all joints together have more than {at.WAVE_ROWS // 2} waves",
-            f"Take {at.WAVE_ROWS // 2 // (_place(scene, joint) + 1) // 2} around each surface at most",
+            f"Take {at.WAVE_ROWS // 2 // (place + 1) // 2} around each surface at most",
         )  # fmt: skip
     return first, rows
 
@@ -277,13 +278,8 @@ def _solved_films(scene: Scene) -> dict[str, Callable[[float], Array]]:
 
 def further_rows(scene: Scene) -> int:
     """Parameters of a sample with films that have further numbers; 0 without such films."""
-    last = max((_place(scene, joint) for joint in _solved_films(scene)), default=-1)
+    last = max((scene.joint_labels.index(joint) for joint in _solved_films(scene)), default=-1)
     return 0 if last < 0 else at.FURTHER + at.FURTHER_ROWS * (last + 1)
-
-
-def _place(scene: Scene, joint: str) -> int:
-    """Which place among the kernel's joints a joint has."""
-    return scene.joint_labels.index(joint)
 
 
 def with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
@@ -302,6 +298,6 @@ def with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
                 "the samples differ in length over diameter, but the film is solved for one ratio",
                 'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
             )  # fmt: skip
-        first = at.FURTHER + at.FURTHER_ROWS * _place(scene, joint)
+        first = at.FURTHER + at.FURTHER_ROWS * scene.joint_labels.index(joint)
         rows[:, first : first + at.FURTHER_ROWS] = further(ratio)
     return rows

@@ -186,9 +186,8 @@ class Lanes:
         self._codes = Codes(0, 0, 0)
         self._budget = 256
         self.counters = np.zeros(Counter.COUNT, np.int64)
-        self._accept_queue(
-            np.empty((0, problem.parameter_rows)), np.empty((0, Start.size)), np.empty(0, np.int64)
-        )
+        no_par, no_start = np.empty((0, problem.parameter_rows)), Start.at_rest(0).rows
+        self._accept_queue(no_par, no_start, np.empty(0, np.int64))
         self._effects = effects
         self._compiled = False
 
@@ -254,14 +253,10 @@ class Lanes:
         return self._block.work[row : row + self.width] == 1.0
 
     @property
-    def waiting(self) -> int:
-        """Samples queued that no lane has taken yet."""
-        return int(self.counters[Counter.SLOTS] - self.counters[Counter.NEXT_SLOT])
-
-    @property
     def pending(self) -> int:
         """Samples that have not finished."""
-        return self.waiting + int(self.running.sum())
+        waiting = self.counters[Counter.SLOTS] - self.counters[Counter.NEXT_SLOT]
+        return int(waiting + self.running.sum())
 
     def run(self, par: Array, start: Start) -> Outcome:
         """Simulate samples to their ends: parameters (m, PARAMETERS) and m starts to m outcomes, in their order.
@@ -339,10 +334,8 @@ class Lanes:
         """
         if self.record_full:
             raise RuntimeError("the record is full; take it first")
-        if (
-            not self._compiled
-        ):  # by the first call, which one rank of a node makes before the others
-            self._compile()
+        if not self._compiled:
+            self._compile()  # by the first call, which one rank of a node makes before the others
         return bool(self._step(*self._arguments(budget)))
 
     def collect(self) -> tuple[Integers, Outcome, Array]:

@@ -132,10 +132,7 @@ class Heard:
 
 
 def _instants_of_bands(scene: Scene) -> int:
-    """Instants a revolution by which spectra of a sample reach as far as the scene's bands, and as far as its response's do.
-
-    Raises InputError if a band lies below the frequency of the drive, or too far above it.
-    """
+    """Instants a revolution by which spectra of a sample reach as far as the scene's bands, and as far as its response's do."""
     bands, period = np.array(scene.bands()), float(parameters(scene)[0, at.PERIOD])
     step = 10.0**0.05  # from the middle of a band to its ends
     for band in bands:

@@ -13,7 +13,7 @@ from hpcclear.dynamics.evaluation.steady import judging
 from hpcclear.dynamics.evaluation.steady.copies import PERTURBATION, perturbed, separation
 from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.judging import objective
-from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.layout.views import Outcome
 
 SHARE = 0.1
 """First guess of rtol over the target error: on 200 random scenes of the paper's box (Hunt-Crossley, 0.5 s/m) the error of
@@ -81,8 +81,7 @@ def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mea
     sample = effort.sample
     rtol = min((SHARE_LATCHED if sample.latched else SHARE) * target, LOOSEST)
     strictness = np.array([1.0, 1.0, given.STRICTER, given.STRICTER])
-    start = perturbed(sample.start, sample.scale, range(2))
-    start = Start(np.concatenate([start.rows, start.rows]))
+    start = perturbed(sample.start, sample.scale, range(2))[[0, 1, 0, 1]]
     history = _History(apart=[PERTURBATION])
     growth = np.nan
     while True:
@@ -104,7 +103,7 @@ def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mea
             return rtol, growth
         if step == "tighten":
             rtol /= given.STRICTER
-            start = Start(np.concatenate([start.rows[2:], start.rows[2:]]))
+            start = start[[2, 3, 2, 3]]
             history = _History(apart=[history.apart[-1]])
 
 

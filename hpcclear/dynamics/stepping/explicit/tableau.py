@@ -44,9 +44,8 @@ class Tableau:
     def __post_init__(self) -> None:
         s = self.stages
         if not (self.a.shape == (s, s) and len(self.b) == len(self.e) == s <= STAGES):
-            raise ValueError(
-                f"{self.name}: the stepper takes pairs of {STAGES} stages at most, the new point included, not {s}"
-            )
+            most = f"{STAGES} stages at most, the new point included, not {s}"
+            raise ValueError(f"{self.name}: the stepper takes pairs of {most}")
 
     @property
     def stages(self) -> int:
