@@ -95,10 +95,8 @@ def _cells(curve: Pieces, intervals: int) -> Array:
 def _grid(starts: Array) -> tuple[Array, int]:
     """The piece that holds the left end of each interval, and how many halvings find any other from there."""
     best: tuple[int, Array] | None = None
-    count = 16
-    while best is None or (
-        best[0] > 1 and count <= min(max(1024, 8 * len(starts)), MOST_INTERVALS)
-    ):
+    count, most = 16, min(max(1024, 8 * len(starts)), MOST_INTERVALS)
+    while best is None or (best[0] > 1 and count <= most):
         held = np.searchsorted(starts, np.arange(count + 1) / count, side="right") - 1
         halvings = int(np.diff(held).max()).bit_length()
         if best is None or halvings < best[0]:

@@ -49,12 +49,12 @@ class Closing:
         self, name: str, columns: dict[Mover, Term], rest: Term, rate: Term, error: Term
     ) -> ClosureRow:
         """`rest`: c'' without the coordinates' accelerations; `rate`, `error`: c' and c."""
-        write, asked = self.writer, -rest
+        write, asked, prescribed = self.writer, -rest, self.kinematics.forest.prescribed
         free: dict[Mover, Term] = {}
         others: dict[Mover, Term] = {}
         for column, term in columns.items():
             turns = column.kind == "angle"
-            given = column.kind == "across" or (turns and self.kinematics.given(column.body))
+            given = column.kind == "across" or (turns and column.body in prescribed)
             if term:
                 (others if given else free)[column] = term
             if turns and given:

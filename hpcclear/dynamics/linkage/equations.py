@@ -12,7 +12,7 @@ from hpcclear.dynamics.linkage.expression import On, Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Contact, Drive, is_pin, split
-from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of, ties_of
+from hpcclear.dynamics.linkage.rubbing import RubbingGuide, coupled, rubbing_of
 from hpcclear.dynamics.linkage.trees import forest
 
 RESERVED = (
@@ -141,8 +141,9 @@ class MotionEquations:
         # friction that moves nothing is worked out last, by those texts that ask for moments or losses
         self.late = [one for one in self.rubbing if not one.moved]
         self.early = [one for one in self.rubbing if one.moved]
+        ties = {(one.touched[0], k) for one in self.early for k in one.touched}
         found: dict[int, Term] = {}
-        for block in blocks(range(n + len(self.constraints)), matrix, ties_of(self.early)):
+        for block in blocks(range(n + len(self.constraints)), matrix, ties):
             found |= self._block(block, matrix, right, n)
         return {k: self._accelerated(k, term) for k, term in sorted(found.items())}
 

@@ -151,10 +151,6 @@ class Kinematics:
         """Angular acceleration that a drive prescribes."""
         return ZERO if frame == GROUND else self._accelerations[frame]
 
-    def given(self, frame: str) -> bool:
-        """Whether a frame's angle is prescribed."""
-        return frame in self.forest.prescribed
-
     # ---- points ---------------------------------------------------------------------------------
     def _number(self, name: str, value: float) -> Term:
         """A parameter, or zero where the mechanism has zero."""
@@ -267,10 +263,10 @@ class Kinematics:
 
     def acceleration(self, point: Point, second: Callable[[Mover], Term]) -> Vector:
         """How its velocity changes; `second`: the acceleration of a coordinate, and of a frame that no drive turns."""
-        found = NOWHERE
+        found, prescribed = NOWHERE, self.forest.prescribed
         for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
             spin = self.spin(frame)
-            turn = self.turn(frame) if self.given(frame) else second(Mover("angle", frame))
+            turn = self.turn(frame) if frame in prescribed else second(Mover("angle", frame))
             for move, speed in self._moving(point, frame):
                 rate = second(Mover(move.kind, move.body))
                 twice = spin * speed + spin * speed  # Coriolis

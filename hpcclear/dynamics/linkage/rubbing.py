@@ -240,11 +240,6 @@ def _beyond(balance: Balance, body: str) -> set[str]:
     return found
 
 
-def ties_of(rubbing: Sequence[Rubbing]) -> set[tuple[int, int]]:
-    """Unknowns that depend on one another by friction."""
-    return {(one.touched[0], k) for one in rubbing for k in one.touched}
-
-
 def coupled(
     rubbing: Sequence[Rubbing], factored: Elimination, found: dict[int, Term]
 ) -> dict[int, Term]:

@@ -204,7 +204,6 @@ SAME_LENGTH = 0.01
 """By how much length over diameter may differ between samples of a film that is solved for one, relative: worn bearings are
 wider."""
 
-
 RAMP = 0.1  # of a threshold of wear, relative: beyond it by so much, all of the force wears
 
 

@@ -48,8 +48,6 @@ def choose_step(rules, work, par, W):
 
 
 ROW_REACH = 1e-7  # part of a step that a row of a table may stand from its end: a corner of the load there does no harm
-
-
 ROUNDED = 1e-15  # of a place, which is a number of lengths before whole ones are taken off
 
 

@@ -20,7 +20,6 @@ ACCELERATION = at.place(at.FOLLOWED_ACCELERATION)
 SQUARE = at.place(at.FOLLOWED_SQUARE)
 ACROSS = at.place(at.FOLLOWED_ACROSS)
 
-
 STRICT = 1e-6  # relative tolerance of explicit steps that is never made stricter at the edge of stability
 
 OF_INERTIA = 0.02

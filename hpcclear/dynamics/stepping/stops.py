@@ -16,7 +16,6 @@ STALLED = int(Status.STALLED)
 
 LONG_AT_REST = 1e3  # periods after which a body that starts from rest and does not turn has stalled
 
-
 KINK_REACH = 1e-3
 """Part of a step that a gap's zero may stand from either end: a kink of the force there does no harm, as its effect falls with
 the 2.5th power, and what the gap does between the two is straight."""

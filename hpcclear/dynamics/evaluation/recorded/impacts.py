@@ -181,8 +181,9 @@ class Spectra:
         found: dict[str, Array] = {"order": np.arange(1.0, most + 1), "band": centres}
         for name, squares in forces.items():
             found[f"{name}_orders"] = np.sqrt(squares.mean(axis=0))
-        for name, ends in self._levels(forces, periods, centres).items():
-            found |= {f"{name}_level{end}": one for end, one in zip(_ENDS, ends, strict=True)}
+        for name, levels in self._levels(forces, periods, centres).items():
+            ends = zip(("", "_lower", "_upper"), levels, strict=True)
+            found |= {f"{name}_level{end}": one for end, one in ends}
         return found
 
     def levels(self, centres: Array) -> dict[str, Array]:
@@ -206,6 +207,3 @@ class Spectra:
             stacked = np.stack(bands, axis=-1)
             found[name] = spectra.levels(stacked.reshape(*stacked.shape[:2], *squares.shape[2:]))
         return found
-
-
-_ENDS = ("", "_lower", "_upper")

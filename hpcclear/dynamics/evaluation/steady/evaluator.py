@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,28 +40,23 @@ class _Ask:
     values: Array
     par: Array
     asking: Generator[Segment, Outcome, Mean]
+    rows: dict[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.segment = next(self.asking)
-        self._rows: dict[int, Array] = {}
 
     def take(self, copy: int, row: Array) -> Mean | None:
         """A copy's outcome; the procedure's result if that was the last thing it waited for."""
-        self._rows[copy] = row
-        if len(self._rows) < len(self.segment.start):
+        self.rows[copy] = row
+        if len(self.rows) < len(self.segment.start):
             return None
-        outcome = Outcome(np.stack([self._rows[k] for k in range(len(self._rows))]))
-        self._rows = {}
+        outcome = Outcome(np.stack([self.rows[k] for k in range(len(self.rows))]))
+        self.rows = {}
         try:
             self.segment = self.asking.send(outcome)
         except StopIteration as end:
             return end.value
         return None
-
-    @property
-    def asks_anew(self) -> bool:
-        """Whether nothing of the segment it waits for has come in."""
-        return not self._rows
 
 
 def check_steady(scene: Scene) -> None:
@@ -171,7 +166,7 @@ class SteadyEvaluator:
                 about = self._record, self._responses, self.scene.objective
                 record = summed_up(sample, ask.par, mean, *about)
                 yield evaluator.with_pressures(self.scene, self._columns, [ask.values], record)
-            elif ask.asks_anew:
+            elif not ask.rows:  # it requests another segment
                 going.append(ask)
         self._queue(going)
 

@@ -49,16 +49,6 @@ def begin_kinks(rules, m):
             control.forget_kinks(m, i)
 
 
-@lane_function
-def keep_polynomials(n, m):
-    """Keep the polynomials of the steps before, where those were accepted."""
-    follows = fetch(m, mem.FOLLOWS)
-    for s in range(STAGES):
-        for k in range(n):
-            old, kept = mem.Z + s * N + k, mem.KEPT + s * N + k
-            put(m, kept, above(follows, fetch(m, old), fetch(m, kept)))
-
-
 @scalar_function
 def begin_steps(effects, moved, W, block, m, settings):
     """Bring the starts of all columns' steps into them."""
@@ -74,7 +64,11 @@ def begin_steps(effects, moved, W, block, m, settings):
         lane = columns.owner(m, i)
         if lane >= 0 and not columns.holds(m, mem.KNOWN, i):
             columns.adopt_start(moved.n, lane, W, block, m, i)
-    keep_polynomials(moved.n, m)
+    follows = fetch(m, mem.FOLLOWS)
+    for s in range(STAGES):
+        for k in range(moved.n):  # polynomials of the steps before, where those were accepted
+            old, kept = mem.Z + s * N + k, mem.KEPT + s * N + k
+            put(m, kept, above(follows, fetch(m, old), fetch(m, kept)))
     begin_kinks(effects.rules, m)
     tolerance = newton.number(m, mem.TOLERANCE)
     for k in range(moved.n):
