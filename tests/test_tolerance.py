@@ -108,8 +108,7 @@ def test_quantiles_and_probabilities_move_as_f_moved_and_stretched(shift):
     assert error[3] == pytest.approx(0.02 * np.hypot(values[0], values[3] - values[0]), rel=1e-9)
     assert (bias == 0.0).all()
     taken = tolerance.Taken(np.full((1, 1, 2), 0.5), np.full((1, 1, 2), 0.5), 15)
-    true = truth.results_of(run, [choice], [whole])
-    true = tolerance._widened(run, [choice], [whole], true, taken)
+    true = tolerance._widened(run, [choice], [whole], taken)
     assert (true["goal_lower"][0, 1], true["goal_upper"][0, 1]) == (0.0, 1.0)  # a probability
     assert true["goal_lower"][0, 2] == 0.0  # a standard deviation
 
