@@ -252,7 +252,7 @@ class Balance:
         """Rates and vectors of 2 v w of what moves in turning frames, and of v^2 where its direction changes."""
         for move in moves:
             if move.turns_along:
-                speed = named(self.kinematics.speed_name((move.kind, move.body)))
+                speed = named(self.kinematics.speed_name((move.kind, move.body, "")))
                 rates = (named("2.0"), speed, self.kinematics.spin(move.frame))
                 yield rates, (move.frame, move.direction.across())
                 if any(move.changing):
