@@ -25,7 +25,7 @@ from scipy.spatial.distance import cdist
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Errors, Kernel, correlation
 from hpcclear.statistics.surrogate.leaf import Columns, inside
-from hpcclear.statistics.surrogate.predictor import kernel_sum, matern_sum, pad
+from hpcclear.statistics.surrogate.predictor import kernel_sum, pad
 
 COLUMNS: Columns = {
     "weight": ("point", "alpha"),
@@ -116,8 +116,8 @@ class Kriging:
         Raises InputError: a point lies outside the box (or is NaN): the model does not extrapolate.
         """
         unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
-        summed = kernel_sum if self.separable else matern_sum
-        return summed(unit, self.packed[0], self.length_scales, self.packed[1], self.mean)
+        scaled, weights = self.packed
+        return kernel_sum(unit, scaled, self.length_scales, weights, self.mean, self.separable)
 
     def variance(self, points: np.ndarray) -> np.ndarray:
         """Kriging variance (n,) of the smooth part at points (n, d), in squared units of the training values. Raises InputError

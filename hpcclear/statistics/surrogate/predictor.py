@@ -37,10 +37,11 @@ def matern(square: float) -> float:
 
 
 @partial(cached, fastmath={"contract"})
-def _squares_row(
-    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+def _kernel_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, smooth: bool, row: Array
 ) -> None:
-    """Fill `row` with squared distances over the inputs `dims`, a place against all training points."""
+    """Fill `row` with the kernel over the inputs `dims`, a place against all training points: `gaussian` if smooth, or
+    `matern`."""
     count = row.size
     row[:] = 0.0
     for k in range(dims.size):
@@ -49,16 +50,12 @@ def _squares_row(
         for i in range(count):
             step = place - inputs[i]
             row[i] += step * step
-
-
-@partial(cached, fastmath={"contract"})
-def _kernel_row(
-    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
-) -> None:
-    """The same with the squared exponential of these distances."""
-    _squares_row(scaled, lengths, dims, coordinates, row)
-    for i in range(row.size):
-        row[i] = gaussian(row[i])
+    if smooth:
+        for i in range(count):
+            row[i] = gaussian(row[i])
+    else:
+        for i in range(count):
+            row[i] = matern(row[i])
 
 
 @partial(cached, fastmath=REORDER)
@@ -70,31 +67,19 @@ def _dot(a: Array, b: Array) -> float:
 
 
 @cached
-def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
+def kernel_sum(
+    unit: Array, scaled: Array, lengths: Array, weights: Array, level: float, smooth: bool
+) -> Array:
     """Kriging means ``level + sum_i weights_i k(x, x_i)`` at places (n, d) in the unit cube, (n,).
 
-    `scaled` (d, p): training points in the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,):
-    in the units of the answer.
+    `smooth`: whether k is the squared exponential, or the Matern function of order 5/2; `scaled` (d, p): training points in
+    the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,): in the units of the answer.
     """
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
     out = np.empty(unit.shape[0])
     for j in range(unit.shape[0]):
-        _kernel_row(scaled, lengths, dims, unit[j], row)
-        out[j] = level + _dot(weights, row)
-    return out
-
-
-@cached
-def matern_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
-    """`kernel_sum` with the Matern function of order 5/2: places (n, d), scaled (d, p), lengths (d,), weights (p,) to (n,)."""
-    dims = np.arange(lengths.size)
-    row = np.empty(weights.size)
-    out = np.empty(unit.shape[0])
-    for j in range(unit.shape[0]):
-        _squares_row(scaled, lengths, dims, unit[j], row)
-        for i in range(row.size):
-            row[i] = matern(row[i])
+        _kernel_row(scaled, lengths, dims, unit[j], smooth, row)
         out[j] = level + _dot(weights, row)
     return out
 
@@ -171,7 +156,7 @@ def tensor_moments(
             width = starts[k + 1] - starts[k]
             inputs = dims[starts[k] : starts[k + 1]]
             for node in range(first[k], first[k + 1]):
-                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], table[node])
+                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], True, table[node])
                 at += width
         digits[:] = 0
         changed = 0
