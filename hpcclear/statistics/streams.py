@@ -70,8 +70,7 @@ def empty(rows: int, bins: int = BINS) -> Summary:
 
 def columns(records: np.ndarray) -> Array:
     """The summarised numbers of records (m,), shape (rows, m); NaN where a sample failed."""
-    pieces = [np.atleast_2d(records[name].T).astype(float) for name in QUANTITIES]
-    values = np.concatenate(pieces)
+    values = np.concatenate([np.atleast_2d(records[n].T).astype(float) for n in QUANTITIES])
     values[:, records["status"] != Status.OK] = np.nan
     return values
 
@@ -101,8 +100,7 @@ def summarise(records: np.ndarray, edges: Array) -> Summary:
             cells = np.searchsorted(edges[row], known, side="right")
             result.histogram[row] = np.bincount(cells, minlength=edges.shape[1] + 1)
     result.status[:] = np.bincount(records["status"], minlength=len(Status))
-    for k, flag in enumerate(Flag):
-        result.flags[k] = np.count_nonzero(records["flags"] & int(flag))
+    result.flags[:] = [np.count_nonzero(records["flags"] & int(flag)) for flag in Flag]
     return result
 
 
@@ -143,7 +141,6 @@ class Accumulator:
         self.edges: Array | None = None
         self._record, self._on_block = record, on_block
         self._open: dict[int, np.ndarray] = {}  # records by block; sample -1: not here yet
-        self._missing: dict[int, int] = {}
         # of all blocks before the next one, and of blocks that are ahead of it
         self._whole, self._next = empty(len(rows_of(record["mean_gap"].shape[0])), bins), 0
         self._ahead: dict[int, Summary] = {}
@@ -157,34 +154,29 @@ class Accumulator:
     def taken(self) -> int:
         """Samples taken so far."""
         summed = sum(int(one.status.sum()) for one in (self._whole, *self._ahead.values()))
-        return summed + sum(len(held) - self._missing[n] for n, held in self._open.items())
+        return summed + sum(int((held["sample"] >= 0).sum()) for held in self._open.values())
 
     def add(self, records: np.ndarray) -> None:
         """Take finished samples, records (m,), none of them twice."""
         numbers = records["sample"] // self.block
         for number in np.unique(numbers).tolist():
-            self._put(number, records[numbers == number])
-        if self.edges is None and self._missing.get(0) == 0:
-            self.edges = histogram_edges(self._open[0], self.bins)
+            first, its = number * self.block, records[numbers == number]
+            if number not in self._open:
+                self._open[number] = np.zeros(min(self.block, self.total - first), self._record)
+                self._open[number]["sample"] = -1
+            self._open[number][its["sample"] - first] = its
+        whole = {n: held for n, held in self._open.items() if (held["sample"] >= 0).all()}
+        if self.edges is None and 0 in whole:
+            self.edges = histogram_edges(whole[0], self.bins)
         if self.edges is None:
             return
-        for number in sorted(n for n, missing in self._missing.items() if missing == 0):
+        for number, held in sorted(whole.items()):
             if self._on_block is not None:
-                self._on_block(number, self._open[number])
-            del self._missing[number]
+                self._on_block(number, held)
             self._ahead[number] = summarise(self._open.pop(number), self.edges)
         while self._next in self._ahead:
             self._whole = merge(self._whole, self._ahead.pop(self._next))
             self._next += 1
-
-    def _put(self, number: int, records: np.ndarray) -> None:
-        first = number * self.block
-        if number not in self._open:
-            self._open[number] = np.zeros(min(self.block, self.total - first), self._record)
-            self._open[number]["sample"] = -1
-            self._missing[number] = len(self._open[number])
-        self._open[number][records["sample"] - first] = records
-        self._missing[number] -= records.size
 
     def result(self) -> Summary:
         """Statistics of the whole design. Raises RuntimeError if samples are missing."""
