@@ -23,19 +23,18 @@ class Compared:
         self.less = np.stack(
             [surely_less(one, its, confidence) for one, its in zip(values.T, shifts, strict=True)]
         )
+        self._any_less: Booleans = np.asarray(self.less.any(axis=0))
         self.known = np.isfinite(values).all(axis=1)
 
     @property
     def one(self) -> Booleans:
         """Whether two designs are statistically indistinguishable in any objective, (n, n)."""
-        any_less = self.less.any(axis=0)
-        return np.asarray(~(any_less | any_less.T))
+        return ~(self._any_less | self._any_less.T)
 
     @property
     def traded(self) -> Booleans:
         """Whether each of two designs is significantly better in some objective, (n, n)."""
-        any_less = self.less.any(axis=0)
-        return np.asarray(any_less & any_less.T)
+        return self._any_less & self._any_less.T
 
     @property
     def beaten(self) -> Booleans:
@@ -68,8 +67,9 @@ class Compared:
             best = self.best(objective)
             if self.traded[best, taken].all():
                 taken.append(best)
-        less = self.less.any(axis=0)  # in some objective
-        behind = np.asarray(less & ~less.T)[self.known].any(axis=0)  # one that is nowhere worse
+        behind = (self._any_less & ~self._any_less.T)[self.known].any(
+            axis=0
+        )  # one that is nowhere worse
         rows = np.flatnonzero(self.known & ~behind)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)

@@ -175,7 +175,7 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
 
 
 def gain(least: Array | float, mean: Array, deviation: Array) -> Array:
-    """Expected amount by which normal numbers stay below `least`, (n,)."""
+    """Expected amount by which normal numbers stay below `least`, (n,); (k, n) below each of (k, 1)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = (least - mean) / deviation
         density = np.exp(-0.5 * steps**2) / np.sqrt(2.0 * np.pi)
@@ -193,15 +193,10 @@ def volume(front: Array, mean: Array, deviation: Array) -> Array:
     extent = np.where(extent > 0.0, extent, 1.0)
     first, second = ((points - low) / extent).T
     mean, deviation = (mean - low) / extent, deviation / extent
-    left = gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0])
+    left = gain(np.append(first, 1.1)[:, None], mean[:, 0], deviation[:, 0])
     strips = np.diff(left, axis=0, prepend=0.0)  # between one point and the next
-    heights = gain_to(np.append(1.1, second), mean[:, 1], deviation[:, 1])
+    heights = gain(np.append(1.1, second)[:, None], mean[:, 1], deviation[:, 1])
     return np.asarray((strips * heights).sum(axis=0))
-
-
-def gain_to(levels: Array, mean: Array, deviation: Array) -> Array:
-    """`gain` below each of some levels, (k, n)."""
-    return np.array([gain(float(level), mean, deviation) for level in levels])
 
 
 def _scalarised(front: Array, drawn: Array, weights: Array) -> Array:

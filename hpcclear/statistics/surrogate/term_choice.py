@@ -95,7 +95,7 @@ def _followed(
     found = np.array(list(terms))[:most]
     table = monomials(z, found)
     basis, factor = np.linalg.qr(table[train])
-    while (lost := _dependent(table[train], factor)).any():
+    while (lost := abs(np.diag(factor)) <= DEPENDENT * np.linalg.norm(table[train], axis=0)).any():
         first = int(lost.argmax())
         found, table = (np.delete(one, first, axis) for one, axis in ((found, 0), (table, 1)))
         counts = [count - (count > first) for count in counts]
@@ -109,11 +109,6 @@ def _followed(
     others = squares[~train]
     errors = [float(others[:, count - 1].sum() / max(len(others), 1)) for count in counts]
     return [found[:count] for count in counts], errors
-
-
-def _dependent(table: Array, factor: Array) -> Booleans:
-    """Columns of a table that, beyond what those before them say, are nearly nothing, by its triangular factor."""
-    return np.abs(np.diag(factor)) <= DEPENDENT * np.linalg.norm(table, axis=0)
 
 
 def _path(z: Array, values: Array, known: Integers, order: int, steps: int) -> list[Term]:
