@@ -5,6 +5,7 @@ import math
 from hpcclear.ensemble import effects
 from hpcclear.scene import Scene
 from hpcclear.scene.switches import switches
+from hpcclear.study.simulations import loads_of
 from hpcclear.study.stages import STAGES
 
 
@@ -26,12 +27,6 @@ def _of_stages(scene: Scene) -> dict[str, int]:
     """The same of all stages but the effect screening, whose size goes by theirs."""
     loads = loads_of(scene)
     return {part: loads * count for stage in STAGES for part, count in stage.samples(scene).items()}
-
-
-def loads_of(scene: Scene) -> int:
-    """How many load cases each design is simulated at."""
-    loads = scene.required_study.load_cases
-    return 1 if loads is None else len(loads.options or ())
 
 
 def responses_of(scene: Scene) -> int:

@@ -29,7 +29,7 @@ from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, truth
 from hpcclear.study.run import StudyRun
-from hpcclear.study.simulations import Simulations
+from hpcclear.study.simulations import Simulations, loads_of
 
 LONGEST = 10.0
 """Seconds that pilots may take."""
@@ -125,7 +125,7 @@ class _Rehearsal(Simulations):
         records = np.repeat(self._like, len(points))
         records["objective"] = found[0]
         self.counts[stage] += len(points)
-        self.next += len(points) * extent.loads_of(self.scene)
+        self.next += len(points) * loads_of(self.scene)
         return records, found
 
     def met(self) -> tuple[Array, Array]:
@@ -149,7 +149,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     as far as it is known without a pilot. `evaluate`: from points to records of the study's objective.
     """
     study, samples = scene.required_study, extent.samples_of(scene)
-    loads = extent.loads_of(scene)
+    loads = loads_of(scene)
     most = int(LONGEST / max(seconds * loads, 1e-9))
     least, looked = LEAST * len(study.models[-1]), REPLICATES * LENGTH
     times = int(np.clip(most // (study.samples + DESIGNS * looked), 1, REHEARSALS))

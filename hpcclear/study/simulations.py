@@ -18,6 +18,12 @@ from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.variables import StudyVariable
 
 
+def loads_of(scene: Scene) -> int:
+    """How many load cases each design is simulated at."""
+    loads = scene.required_study.load_cases
+    return 1 if loads is None else len(loads.options or ())
+
+
 def at_all(loads: StudyVariable, points: Points) -> Points:
     """Designs (n, d) at all load cases, (n * cases, d), those of a design one behind the other."""
     options = np.array(loads.options)
@@ -106,11 +112,9 @@ class Simulations:
     def judged(self, points: Points, stage: str) -> tuple[np.ndarray, Array]:
         """The same, and the responses of the study: its objective and `Study.further`, (k, n), NaN where it failed."""
         loads = self.scene.required_study.load_cases
-        if loads is None:
-            records = self._records(points, stage)
-            return records, self._responses(records)
-        records = self._records(at_all(loads, points), stage)
-        return combined(records, self._responses(records), loads)
+        records = self._records(at_all(loads, points) if loads else points, stage)
+        responses = self._responses(records)
+        return combined(records, responses, loads) if loads else (records, responses)
 
     def _responses(self, records: np.ndarray) -> Array:
         further = [self.scene.objective_named(name) for name in self.scene.required_study.further]
@@ -127,7 +131,7 @@ class Simulations:
         loads, found = self.scene.required_study.load_cases, self._responses(records)
         if loads is not None:
             found = combined(records, found, loads)[1]
-            values = values[:: len(loads.options or ())]
+            values = values[:: loads_of(self.scene)]
         return values, found
 
     def _records(self, points: Points, stage: str) -> np.ndarray:
@@ -139,8 +143,12 @@ class Simulations:
         with self._ranks.writing():  # a long fit may follow
             self._checkpoint.flush_when_due()
         self.next += len(points)
-        if stage != "search":  # which then looks elsewhere
-            _refuse_if_all_failed(records, stage)
+        failed = len(records) > 0 and not (records["status"] == Status.OK).any()
+        if failed and stage != "search":  # which then looks elsewhere
+            codes, counts = np.unique(records["status"], return_counts=True)
+            worst = Status(int(codes[counts.argmax()]))
+            reason = f"all of these simulations failed, most often because {worst.message}"
+            raise InputError(stage, len(records), reason, worst.remedy)
         return records
 
     def objective(self, records: np.ndarray) -> Array:
@@ -150,12 +158,3 @@ class Simulations:
     def values(self, names: Sequence[str], coordinates: Array, stage: str) -> Array:
         """Objectives of designs in sampling coordinates, shape (n,), NaN where failed."""
         return self.objective(self.records(self.designs(names, coordinates), stage))
-
-
-def _refuse_if_all_failed(records: np.ndarray, stage: str) -> None:
-    if len(records) == 0 or (records["status"] == Status.OK).any():
-        return
-    codes, counts = np.unique(records["status"], return_counts=True)
-    worst = Status(int(codes[counts.argmax()]))
-    reason = f"all of these simulations failed, most often because {worst.message}"
-    raise InputError(stage, len(records), reason, worst.remedy)

@@ -29,6 +29,7 @@ from hpcclear.statistics.random.replicates import Estimate, moments, spread
 from hpcclear.study import contest, contributions, goals, truth, verdicts, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.simulations import loads_of
 
 STRICTER, STRICTEST = 100.0, 1e-14
 """By how much the tolerance of pairs is stricter, and how strict it may be."""
@@ -113,9 +114,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals; besides ``tolerance`` and
     ``tolerance_error``, (n, 2): bias of mean and standard deviation by the tolerance, relative, and its standard error."""
     made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)
-    loads = run.study.load_cases
-    others = run.simulations.next // (1 if loads is None else len(loads.options or ()))
-    most = _most(run.study, others)
+    most = _most(run.study, run.simulations.next // loads_of(run.scene))
     strict = _begun(run, designs, made, most)
     paired: set[int] = set()
     taken = _known(run, designs, made, strict)

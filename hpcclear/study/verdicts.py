@@ -82,25 +82,18 @@ def of_interval(
         return Decision(Verdict.HOLDS, np.nan)
     if one.lower > goal.most:
         return Decision(Verdict.FAILS, np.nan)
-    return Decision(Verdict.UNDECIDED, _price(goal, one, simulations, confidence, taken))
-
-
-def _price(
-    goal: Constraint, one: Limited, simulations: int, confidence: float, taken: float
-) -> float:
-    """Simulations after which an interval would just exclude the threshold: its width falls as the root of their number, but
-    for what the tolerance takes."""
     gap = abs(goal.most - one.value)
     if taken >= gap > 0.0:
-        return np.inf
+        return Decision(Verdict.UNDECIDED, np.inf)
     if goal.statistic == "exceedance" and one.value == 0.0:
         needed = without_any(goal.most, confidence)  # the interval narrows as one over the number
     elif not (gap > 0.0 and np.isfinite([one.value, one.lower, one.upper]).all()):
-        return np.nan
-    else:
+        return Decision(Verdict.UNDECIDED, np.nan)
+    else:  # the width falls as the root of the number, but for what the tolerance takes
         reach = one.upper - one.value if one.value <= goal.most else one.value - one.lower
         needed = simulations * (max(reach - taken, 0.0) / (gap - taken)) ** 2
-    return float(2.0 ** math.ceil(math.log2(max(needed, simulations + 1.0))))
+    price = 2.0 ** math.ceil(math.log2(max(needed, simulations + 1.0)))
+    return Decision(Verdict.UNDECIDED, float(price))
 
 
 def without_any(most: float, confidence: float) -> float:
