@@ -6,11 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
-from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
 from hpcclear.base.outcome import FIELDS, IMPACTS, RESPONSES, Flag, Status, unknown
-from hpcclear.base.width import doubles_in_a_vector
+from hpcclear.base.width import doubles_in_a_vector, first_level_cache
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
