@@ -36,29 +36,13 @@ COMPLAINT_PATIENCE = 30.0
 """Seconds that a rank which cannot begin waits for them: they may be at something that needs no MPI."""
 
 
-def run_on_ranks(
-    program: Callable[[Ranks], int | None],
-    stop: StopSwitch | None = None,
-    ahead: Sequence[str] = (),
-    *,
-    resumes: bool = True,
-) -> int:
-    """Run `program` on root while the other ranks work for it: the `boundary` no error crosses.
+def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None = None) -> int:
+    """Run `program`, which gets the `Ranks`, on root while the other ranks work for it: the `boundary` no error crosses.
 
-    Parameters
-    ----------
-    program : callable
-        Gets the `Ranks`; its return value is the exit code (None is 0).
-    stop, ahead, resumes
-        As `boundary`.
-
-    Returns
-    -------
-    int
-        Exit code for `sys.exit`, the same on every rank.
+    Returns the exit code for `sys.exit`, the same on every rank: what `program` returns (None is 0), or that of an error.
     """
     try:
-        with boundary(stop, ahead, resumes=resumes) as ranks:
+        with boundary(stop) as ranks:
             sys.exit(program(ranks))
     except SystemExit as error:
         return int(error.code or Exit.DONE)

@@ -57,9 +57,8 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
 def accurate(goal: Goal, one: Limited, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
     """Whether its interval is as narrow as requested, or as a part of that."""
     share, relative = wanted(goal, accuracy)
-    share *= part
-    half = (one.upper - one.lower) / 2.0
-    return bool(half <= share * (abs(one.value) if relative else 1.0))
+    size = abs(one.value) if relative else 1.0
+    return bool((one.upper - one.lower) / 2.0 <= share * part * size)
 
 
 def excess(kept: Sequence[Constraint], values: Array, further: Array | float = 0.0) -> Array:

@@ -202,10 +202,9 @@ def volume(front: Array, mean: Array, deviation: Array) -> Array:
 def _scalarised(front: Array, drawn: Array, weights: Array) -> Array:
     """What draws, (s, n, m), win on average of a weighted distance to the ideal point (augmented Chebyshev)."""
     low, extent = front.min(axis=0), np.ptp(front, axis=0)
-    extent = np.where(extent > 0.0, extent, 1.0)
 
     def distance(values: Array) -> Array:
-        parts = weights * (values - low) / extent
+        parts = weights * (values - low) / np.where(extent > 0.0, extent, 1.0)
         return np.asarray(parts.max(axis=-1) + 0.05 * parts.sum(axis=-1))
 
     return np.asarray(np.maximum(distance(front).min() - distance(drawn), 0.0).mean(axis=0))

@@ -100,8 +100,7 @@ def relative_gain(before: Array, now: Array) -> float:
     """
     if not (before.size and now.size):
         return float("nan")
-    low = now.min(axis=0)
-    extent = np.ptp(now, axis=0)
+    low, extent = now.min(axis=0), np.ptp(now, axis=0)
     extent = np.where(extent > 0.0, extent, np.abs(low))
     extent = np.where(extent > 0.0, extent, 1.0)
     reference = np.full(len(low), 1.1)
