@@ -132,13 +132,12 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("error", "count"), [(0.0, 150), (1e-6, 150), (1.0, 150), (0.0, 12)])
-def test_draws_are_had_of_any_values(shape, error, count):
+def test_draws_are_had_of_any_values(monkeypatch, shape, error, count):
     """Known exactly and in number, designs have variances of round-off; draws of them have their size and no other."""
     rng = np.random.default_rng(3)
     designs = BOUNDS[:, 0] + rng.random((count, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    values = SHAPES[shape](designs)[:, None]
-    space = Space(BOUNDS, np.eye(1), (None,), np.empty(0))
-    beliefs = Beliefs(known_of(designs, values, error), space, rng)
+    known = known_of(designs, SHAPES[shape](designs)[:, None], error)
+    beliefs = Beliefs(known, Space(BOUNDS, np.eye(1), (None,), np.empty(0)), rng)
     points, loss = improvement.drawn(beliefs, np.ones(1), 3)
     assert len(points) == 3
     largest = beliefs.variances(np.vstack([designs, points])).max() ** 0.5
@@ -146,6 +145,9 @@ def test_draws_are_had_of_any_values(shape, error, count):
     for row, point in enumerate(points):
         others = np.vstack([designs, np.delete(points, row, axis=0)])
         assert steps_apart(point, others) > improvement.NEAR
+    monkeypatch.setattr(improvement, "MOST", 1)
+    lone, _ = improvement.drawn(beliefs, np.ones(1), 3)
+    assert (beliefs.means(lone) <= beliefs.believed.min()).all()
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 2868.776])
@@ -270,9 +272,8 @@ def test_a_search_ends_at_the_front(done):
     np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
     assert float(alpha["first_true"]) <= 1.005 * float(found["first_true"].min())  # or lighter
     assert not any("averaged" in name for name in found["design"].to_numpy())
-    counted = extent.samples_of(study())
-    samples = opened.read(done / "samples.nc", "samples")
-    assert samples.sizes["sample"] < sum(counted.values())
+    samples = opened.read(done / "samples.nc", "samples").sizes["sample"]
+    assert samples < sum(extent.samples_of(study()).values())
 
 
 def simulated(f, length, guesses=()):

@@ -90,6 +90,7 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     points = points[beliefs.feasible(points) >= LIKELY]
     mean, variance = beliefs.means(points) @ direction, beliefs.variances(points) @ direction**2
     least = mean - UNSEEN * np.sqrt(variance)
+    least[mean <= mean.min(initial=np.inf)] = -np.inf  # the best is drawn first: losses are its own
     may = np.argsort(least, kind="stable")[: min((least <= mean.min(initial=np.inf)).sum(), MOST)]
     points, mean = points[may], mean[may]
     new = _apart(points, beliefs)
