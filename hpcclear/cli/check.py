@@ -239,7 +239,7 @@ def _cost_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     whole = 0
     if scene.study.cases:
         from hpcclear.base.objectives import asked
-        from hpcclear.study.forecast import expected
+        from hpcclear.study.forecast import OFTEN, expected
 
         def evaluated(points: Points) -> np.ndarray:
             return asked(evaluate_records(scene, points), scene.objective)
@@ -247,7 +247,7 @@ def _cost_rows(scene: Scene) -> Iterator[tuple[str, str]]:
         whole, each = expected(scene, evaluated, each)
     yield "hpcclear sample", _all(scene.study.samples, each)
     if whole:
-        yield "hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan"
+        yield "hpcclear run", f"about {_all(whole, each)}; {OFTEN}"
 
 
 def _all(count: int, each: float) -> str:

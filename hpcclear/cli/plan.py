@@ -42,7 +42,7 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
     out = console()
     row = next((row for row in plan.rows if row.error == error), plan.rows[0])
     job = plan.simulations, plan.workers
-    command = "sample" if plan.study is None else "run"
+    command, about = ("sample", "") if plan.study is None else ("run", "about ")
     rows = []
     for one in plan.rows:
         reached = "as in file" if one.error is None else f"{one.error:.0e}"
@@ -50,7 +50,7 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
         hours = f"{plan.core_seconds(one, *job) / 3600:.2g}"
         wall = duration(plan.wall_seconds(one, *job))
         rows.append((reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall))
-    title = f"{command}: {plan.simulations} simulations on {counted(plan.workers, 'rank')}"
+    title = f"{command}: {about}{plan.simulations} simulations on {counted(plan.workers, 'rank')}"
     header = ("error of f", "settings", "ms/sample", "core-h", "wall time")
     out.print(table(title, rows, header))
     show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == ON_SCREEN])
