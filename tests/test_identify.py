@@ -257,7 +257,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     assert "correlation of errors -0." in list(lines(content))[-1].text
     assert any("not identified separately" in text for text in warnings(content))
     together = next(line.text for line in lines(content) if line.label == "together")
-    found_sum = re.search(r"only (0\.\d+) crank_rod \+ (0\.\d+) rod_slider = (\d+) µm", together)
+    found_sum = re.search(r"only (0\.\d+) crank_rod \+ (0\.\d+) rod_slider = ([\d.]+) µm", together)
     assert [float(one) for one in found_sum.groups()] == pytest.approx([0.5, 0.5, 80.0], rel=0.15)
     widths = np.ptp(content["interval"].to_numpy()[0], axis=1)
     assert (widths > 3e-5).all()  # each is open, though their mean is known

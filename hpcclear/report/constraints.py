@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.verdict import Verdict, together
-from hpcclear.report.figures.labels import between, quantity
+from hpcclear.report.figures.labels import quantity, stated
 from hpcclear.results.content import Results, each, number_in, text_in
 
 ABSENT = 3
@@ -44,10 +44,11 @@ class JudgedConstraint(NamedTuple):
         return f"at most {quantity(self.most, self.unit)}: {WORDS[self.verdict]}"
 
     def __str__(self) -> str:
-        text = f"{self.goal} = {quantity(self.true, self.unit)}"
-        if self.lower < self.upper:
-            text += f" (95 % CI {between(self.lower, self.upper, self.unit)})"
-        return f"{text}, {self.bounded}" + (f" ({self.deciding})" if self.deciding else "")
+        shown, ends = stated(self.true, self.lower, self.upper, self.unit)
+        within = f" (95 % CI {ends})" if self.lower < self.upper else ""
+        return f"{self.goal} = {shown}{within}, {self.bounded}" + (
+            f" ({self.deciding})" if self.deciding else ""
+        )
 
 
 def constraints_of(one: Results) -> list[JudgedConstraint]:

@@ -99,11 +99,11 @@ def _columns(lines: spread.Lines, units: Units) -> dict[str, list[object]]:
     shown = [unit or si for (_, si), unit in rows.items()]
     columns: dict[str, list[object]] = {"statistic": [label for label, _ in rows], "unit": [*shown]}
     for name, own in lines.items():
-        for k, end in enumerate(spread.StatedValue._fields[:3]):
+        for end in spread.StatedValue._fields[:3]:
             cells = columns[f"{name} {end}"] = []
             for (label, si), unit in rows.items():
                 found = own.get(label, spread.Line("", "")).estimate
-                number = found.ends[k] if found.unit == si else math.nan
+                number = getattr(found, end) if found.unit == si else math.nan
                 cells.append(number / float(factor(unit, si)) if unit else number)
     return columns
 

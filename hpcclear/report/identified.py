@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcclear.report.figures import labels
-from hpcclear.report.figures.labels import quantity
+from hpcclear.report.figures.labels import quantity, stated
 from hpcclear.report.spread import Line
 from hpcclear.results.content import Results
 
@@ -17,16 +16,6 @@ TOGETHER = 0.9
 """Correlation of two unknowns from which on the signal gives their combination only."""
 
 DAY = 86400.0
-
-
-def rounded(value: float, unit: str, digits: int = 2) -> str:
-    """Return a number to some digits in a unit of a readable size, without an exponent."""
-    if not np.isfinite(value):
-        return quantity(value, unit)
-    scale = labels.scale(unit, value)
-    shown = float(f"{value * scale.factor:.{digits}g}")
-    text = f"{shown:.0f}" if abs(shown) >= 10 ** (digits - 1) else f"{shown:.{digits}g}"
-    return f"{text} {scale.unit}" if scale.unit != "–" else text
 
 
 def lines(content: Results) -> Iterator[Line]:
@@ -70,9 +59,9 @@ def _together(content: Results, record: int) -> str:
     if abs(related) <= TOGETHER:
         return f"identified separately (correlation {related:.2f})"
     names = [short(name) for name in content["unknown"].values]
-    units = set(content["unit"].values.astype(str))
+    (unit, *other) = set(content["unit"].values.astype(str))
     text = f"not identified separately (correlation {related:.2f})"
-    if len(units) > 1:
+    if other:
         return text
     places = content["posterior"].values[record, :, : len(names)]
     weights = np.linalg.eigh(np.cov(places.T))[1][:, 0]  # the direction of the least variance
@@ -80,8 +69,8 @@ def _together(content: Results, record: int) -> str:
     low, middle, high = np.quantile(places @ weights, (0.025, 0.5, 0.975))
     signed = (f"{'-' if weight < 0.0 else '+'} {abs(weight):.2f}" for weight in weights)
     terms = " ".join(map(" ".join, zip(signed, names, strict=True)))
-    middle, low, high = (rounded(float(one), *units) for one in (middle, low, high))
-    return f"{text}, only {terms.removeprefix('+ ')} = {middle} (95 % interval {low} to {high})"
+    shown, ends = stated(middle, low, high, unit)
+    return f"{text}, only {terms.removeprefix('+ ')} = {shown} (95 % interval {ends})"
 
 
 def interval(content: Results, record: int, unknown: int) -> str:
@@ -92,15 +81,14 @@ def interval(content: Results, record: int, unknown: int) -> str:
     low, middle, high = (float(one) for one in content["interval"][record, unknown])
     least, most = (float(content[f"prior_{end}"][unknown]) for end in ("lower", "upper"))
     span = most - least
+    shown, ends = stated(middle, low, high, unit)
     if high - low > NARROWED * span:
-        return f"not determined: 95 % interval {rounded(low, unit)} to {rounded(high, unit)}"
-    digits = 2 if high - low > 0.05 * abs(middle) else 3
-    ends = f"{rounded(low, unit, digits)} to {rounded(high, unit, digits)}"
+        return f"not determined: 95 % interval {ends}"
     if low - least < 0.02 * span:
-        return f"at most {rounded(high, unit, digits)} (95 % interval {ends}; the lower bound cuts it off)"
-    if most - high < 0.02 * span:
-        return f"at least {rounded(low, unit, digits)} (95 % interval {ends}; the upper bound cuts it off)"
-    return f"{rounded(middle, unit, digits)} (95 % interval {ends})"
+        shown, ends = f"at most {quantity(high, unit, 2)}", f"{ends}; the lower bound cuts it off"
+    elif most - high < 0.02 * span:
+        shown, ends = f"at least {quantity(low, unit, 2)}", f"{ends}; the upper bound cuts it off"
+    return f"{shown} (95 % interval {ends})"
 
 
 def _growth(content: Results) -> Iterator[Line]:
@@ -108,12 +96,13 @@ def _growth(content: Results) -> Iterator[Line]:
     of = f", from the {used} of {every} records that the model explains" if used < every else ""
     for u, name in enumerate(content["unknown"].values):
         unit = str(content["unit"].values[u])
-        low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
-        text = f"{middle} per day (95 % interval {low} to {high}){of}"
+        low, middle, high = (float(one) * DAY for one in content["rate"][:, u])
+        shown, ends = stated(middle, low, high, unit)
+        text = f"{shown} per day (95 % interval {ends}){of}"
         yield Line(f"growth, {named(name)}", text)
         if "limit" in content.attrs:
             times = content["time_to_limit"].values[:, u] / DAY
-            days = [f"{rounded(t, '1')} days" if np.isfinite(t) else "never" for t in times]
+            days = [f"{quantity(t, '1', 2)} days" if np.isfinite(t) else "never" for t in times]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
             yield Line(f"time to {limit}, {named(name)}", text)
@@ -126,7 +115,7 @@ def _advice(content: Results) -> Iterator[Line]:
         for u, unknown in enumerate(content["unknown"].values):
             unit = str(content["unit"].values[u])
             pairs = zip(content["expected_half_width"].values[k, :, u], counts, strict=True)
-            shown = (f"{rounded(float(width), unit)} ({count})" for width, count in pairs)
+            shown = (f"{quantity(float(width), unit, 2)} ({count})" for width, count in pairs)
             parts.append(f"{short(unknown)} ± {', '.join(shown)}")
         if len(parts) > 1:
             related = float(content["expected_correlation"][k, -1])

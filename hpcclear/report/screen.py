@@ -16,6 +16,9 @@ from hpcclear.report.figures import labels
 WORRIES, TILES = 6, 4
 """Lines on what to trust, and figures, of a first screen; a sheet has all."""
 
+HEADER = "quantity", "value", "95 %, note"
+"""Heads of figures; a table with the same ones follows them."""
+
 
 class Level(IntEnum):
     """How far a result can be trusted, the worst first."""
@@ -96,7 +99,7 @@ class Screen:
     """Why the headline is not to be relied on; "" where nothing is known against it."""
     tiles: tuple[Tile, ...] = ()
     """The most important first."""
-    header: tuple[str, ...] = ()
+    header: tuple[str, ...] = HEADER
     rows: tuple[ScreenRow, ...] = ()
     """header and rows: the table beside, and its heads; the rows' label is the first."""
     remark: str = ""
@@ -128,11 +131,10 @@ class Screen:
             design = zip(self.rows, ends, strict=True)
             rows = [(row.label, *row.cells, "", end) for row, end in design]
             return [[("", *self.header[1:], "change", "95 %, note"), *tiles, *rows]]
-        numbers = [(one.label, one.value, one.within) for one in self.tiles]
-        rows = [(row.label, *row.cells) for row in self.rows]
-        head = ("quantity", "value", "95 %, note")
-        own: list[list[Sequence[str]]] = [[head, *numbers], [self.header, *rows]]
-        return [table for table in own if len(table) > 1]
+        own: dict[Sequence[str], list[Sequence[str]]] = {HEADER: [], self.header: []}
+        own[HEADER] += ((one.label, one.value, one.within) for one in self.tiles)
+        own[self.header] += ((row.label, *row.cells) for row in self.rows)
+        return [[head, *rows] for head, rows in own.items() if rows]
 
 
 def trusted(lines: Iterable[Trust], outside: bool = False) -> tuple[Trust, ...]:
@@ -190,4 +192,4 @@ def within(value: float, low: float, high: float, unit: str) -> str:
         return "interval not known"
     if value and (high - low) < abs(value):
         return percent((high - low) / 2.0 / abs(value))
-    return labels.between(low, high, unit) if low < high else ""
+    return labels.stated(value, low, high, unit)[1] if low < high else ""

@@ -40,11 +40,6 @@ class StatedValue(NamedTuple):
     unit: str = ""
 
     @property
-    def ends(self) -> tuple[float, float, float]:
-        """The value and the ends of its interval."""
-        return self.value, self.lower, self.upper
-
-    @property
     def known(self) -> bool:
         """Whether there is a number."""
         return bool(np.isfinite(self.value))
@@ -239,8 +234,8 @@ def _quantile(values: Array, level: float, unit: str, drawn: bool) -> tuple[str,
     failed = len(values) - len(known)
     low, high = order_interval(known, level, failed)
     if np.isfinite([low, high]).all():
-        text = f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
-        return text, StatedValue(value, low, high, unit)
+        shown, ends = labels.stated(value, low, high, unit)
+        return f"{shown} ({ends})", StatedValue(value, low, high, unit)
     if failed and len(values) >= fewest(level):
         return "not stated: too many samples failed", StatedValue()
     return f"not stated: it needs {fewest(level)} samples", StatedValue()

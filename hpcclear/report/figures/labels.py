@@ -113,10 +113,12 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
         return text
     chosen = scale(units, value)
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
-    shown = f"{value * chosen.factor:.{digits}g}"
-    if "e+" in shown and abs(float(shown)) < PLAIN:
-        shown = f"{float(shown):.0f}"
-    return f"{shown}{unit}"
+    return f"{_shown(value * chosen.factor, digits)}{unit}"
+
+
+def _shown(number: float, digits: int) -> str:
+    text = f"{number:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(float(text)) < PLAIN else text
 
 
 def value(one: Variable) -> str:
@@ -133,7 +135,7 @@ def quantities(values: Sequence[float], units: str, digits: int = 4) -> list[str
     if len({text.partition(" ")[2] for text in texts if text != "–"}) < 2:
         return texts
     chosen = scale(units, values)
-    shown = (f"{one * chosen.factor:.{digits}g} {chosen.unit}" for one in values)
+    shown = (f"{_shown(one * chosen.factor, digits)} {chosen.unit}" for one in values)
     return [text if np.isfinite(one) else "–" for text, one in zip(shown, values, strict=True)]
 
 
@@ -186,6 +188,19 @@ def between(low: float, high: float, units: str) -> str:
         if ends[0] != ends[1]:
             break
     return " to ".join(dict.fromkeys(ends))
+
+
+def stated(value: float, low: float, high: float, units: str) -> tuple[str, str]:
+    """Return a value and its confidence interval in words, in one unit and to two digits of half its width, outwards."""
+    chosen, digits = scale(units, (value, low, high)), 4
+    numbers = np.array([value, low, high]) * chosen.factor
+    if low < high:
+        step, digits = 10.0 ** (np.floor(np.log10((numbers[2] - numbers[1]) / 2.0)) - 1.0), 7
+        value, low, high = numbers / step
+        numbers = np.array([np.round(value), np.floor(low + 1e-9), np.ceil(high - 1e-9)]) * step
+    shown, *ends = (_shown(one, digits) for one in numbers)
+    unit = "" if chosen.unit == "–" else f" {chosen.unit}"
+    return f"{shown}{unit}", f"{' to '.join(dict.fromkeys(ends))}{unit}"
 
 
 def of(variable: Variable) -> Scale:

@@ -6,11 +6,13 @@ import numpy as np
 
 from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.base.plain import counted
+from hpcclear.base.student import student
 from hpcclear.report import bearings, failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted
 from hpcclear.results.content import Results
+from hpcclear.statistics.random.survival import CONFIDENCE
 
 MOST = 0.5
 """Share of samples with a warning from which on it is red."""
@@ -38,13 +40,9 @@ def samples(found: Results, content: Content) -> Screen:
     names = ", ".join(labels.words(v) for v in labels.design_variables(found))
     varied = f"varied: {names}" if names else ""
     shown = {line.label: line for line in spread.statistics(found) if line.estimate.known}
-    tiles = tuple(
-        Tile(line.label, labels.quantity(line.estimate.value, unit), within=_interval(line))
-        for line in shown.values()
-        if line.label in ("mean of f", "std. deviation of f", "P95 of f", "median of f")
-    )
-    peaks = [line for label, line in shown.items() if label.startswith(("P95 peak", "P99"))]
-    rows = [ScreenRow(k.label, (k.text.partition(" (")[0], _interval(k))) for k in peaks]
+    stated = {label: _stated(line) for label, line in shown.items()}
+    first = "mean of f", "std. deviation of f", "P95 of f", "median of f"
+    rows = [ScreenRow(*one) for one in stated.items() if one[0].startswith(("P95 peak", "P99"))]
     headline = "Every simulation failed"
     if np.isfinite(f).any():
         headline = f"mean of f {labels.quantity(float(np.nanmean(f)), unit)}"
@@ -57,19 +55,19 @@ def samples(found: Results, content: Content) -> Screen:
         labels.sentence(headline, found),
         (f"f: {labels.objective(found)}", counted(len(f), "simulation"), varied),
         "the contact model is outside its range" if share > MOST else "",
-        tiles,
-        ("statistic", "value", "95 % CI") if rows else (),
-        tuple(rows),
+        tuple(Tile(name, one[0], within=one[1]) for name, one in stated.items() if name in first),
+        rows=tuple(rows),
         trust=trusted(_trust(found), share > MOST),
         figures=("samples",),
     )
 
 
-def _interval(line: spread.Line) -> str:
-    value, low, high = line.estimate.ends
+def _stated(line: spread.Line) -> tuple[str, str]:
+    value, low, high, unit = line.estimate
     if not np.isfinite([low, high]).all():
-        return "interval not stated"
-    return f"95 % CI {labels.between(low, high, line.estimate.unit)}" if value else ""
+        return labels.quantity(value, unit), "interval not stated"
+    shown, within = labels.stated(*line.estimate)
+    return shown, f"95 % CI {within}" if value else ""
 
 
 def _share(found: Results, flag: Flag) -> float:
@@ -163,17 +161,15 @@ def statistics(found: Results, content: Content) -> Screen:
     by_status = found["samples_by_status"]
     total, good = int(np.sum(by_status.values)), int(by_status.sel(outcome=int(Status.OK)))
     number = int(found["objective_count"])
-    headline, tiles = "Every simulation failed", list[Tile]()
+    headline = "Every simulation failed"
     if number > 1:
         mean, deviation = (float(found[f"objective_{n}"]) for n in ("mean", "deviation"))
         unit = str(found["objective_mean"].attrs["units"])
-        error = labels.quantity(deviation / number**0.5, unit, 2)
-        shown = labels.quantity(mean, unit, 6), labels.quantity(deviation, unit)
+        half = student(CONFIDENCE, number - 1) * deviation / number**0.5
+        shown = labels.with_half_width(mean, half, unit), labels.quantity(deviation, unit)
         headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
-        tiles.append(Tile("mean of f", shown[0], within=f"standard error {error}"))
-        tiles.append(Tile("std. deviation of f", shown[1]))
     level = amber if good < total else green
     lost = level(f"{good} of {total} simulations without failure", "quality")
     single = amber("The half-width of a single f was not checked", "quality")
     about, trust = (f"f: {labels.objective(found)}",), trusted([lost, single])
-    return Screen(labels.sentence(headline, found), about, tiles=tuple(tiles), trust=trust)
+    return Screen(labels.sentence(headline, found), about, trust=trust)
