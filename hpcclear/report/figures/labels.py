@@ -191,11 +191,15 @@ def between(low: float, high: float, units: str) -> str:
 
 
 def stated(value: float, low: float, high: float, units: str) -> tuple[str, str]:
-    """Return a value and its confidence interval in words, in one unit and to two digits of half its width, outwards."""
+    """Return a value and its confidence interval in words, in one unit, to two digits of half its width, outwards, and four of
+    all."""
+    if not np.isfinite(value):
+        return "–", "–"
     chosen, digits = scale(units, (value, low, high)), 4
     numbers = np.array([value, low, high]) * chosen.factor
     if low < high:
-        step, digits = 10.0 ** (np.floor(np.log10((numbers[2] - numbers[1]) / 2.0)) - 1.0), 7
+        sizes = np.log10([(numbers[2] - numbers[1]) / 2.0, abs(numbers).max()])
+        step, digits = 10.0 ** (np.floor(sizes) - [1.0, 3.0]).max(), 7
         value, low, high = numbers / step
         numbers = np.array([np.round(value), np.floor(low + 1e-9), np.ceil(high - 1e-9)]) * step
     shown, *ends = (_shown(one, digits) for one in numbers)

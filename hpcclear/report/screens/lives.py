@@ -168,10 +168,11 @@ def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
     """Each joint with its new and final clearance, medians, and the range of the final one, "" where it has none."""
     rows = []
     at_end = quantiles(lives["end_clearance"].values, np.array([0.05, 0.5, 0.95]))
+    (fresh,) = quantiles(lives["clearance"].isel(cycle=0).values, np.array([0.5]))
     for k, name in enumerate(texts_in(lives, "joint")):
-        new = float(np.nanmedian(lives["clearance"].isel(cycle=0).sel(joint=name)))
+        new = quantity(float(fresh[k]), "m")
         low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
-        rows.append((name, quantity(new, "m"), middle, f"{low} to {high}" if low != high else ""))
+        rows.append((name, new, middle, f"{low} to {high}" if low != high else ""))
     return rows
 
 

@@ -43,13 +43,12 @@ def _row(one: bearings.Bearing) -> ScreenRow:
 
 def _headline(response: Results, loads: Sequence[bearings.Bearing]) -> str:
     """The largest force and where it acts, and f."""
-    unit = str(response["objective"].attrs["units"])
-    f = f"f {labels.quantity(float(response['objective']), unit)}"
+    said = f"f {_f(response)} {_within(response)}".removesuffix(f" {labels.NOT_CHECKED}")
     if not loads:
-        return labels.sentence(f, response)
+        return labels.sentence(said, response)
     worst = max(loads, key=lambda one: one.peak)
     peak = f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {worst.joint}"
-    return labels.sentence(f"{peak}; {f}", response)
+    return labels.sentence(f"{peak}; {said}", response)
 
 
 def half_width(response: Results) -> float:
@@ -63,13 +62,17 @@ def _within(response: Results) -> str:
     if not np.isfinite(reach):
         return labels.NOT_CHECKED
     unit = str(response["objective"].attrs["units"])
-    return f"± {100 * reach / abs(f):.2g} %" if f else f"± {labels.quantity(reach, unit)}"
+    shown = labels.quantity(100 * reach / abs(f), "%", 2) if f else labels.quantity(reach, unit)
+    return f"± {shown}"
+
+
+def _f(response: Results) -> str:
+    f, half = float(response["objective"]), half_width(response)
+    return labels.stated(f, f - half, f + half, str(response["objective"].attrs["units"]))[0]
 
 
 def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tile]:
-    f, unit = float(response["objective"]), str(response["objective"].attrs["units"])
-    digits = 2 if half_width(response) > 0.05 * abs(f) else 4
-    yield Tile("f", labels.quantity(f, unit, digits), within=_within(response))
+    yield Tile("f", _f(response), within=_within(response))
     for one in sorted(loads, key=lambda one: -one.peak)[:1]:
         angle = "" if bearings.degrees(one) == "–" else f"at {bearings.degrees(one)}"
         yield Tile(f"peak force, {one.joint}", labels.quantity(one.peak, "N"), within=angle)
@@ -77,7 +80,8 @@ def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Til
     mean = f"mean {labels.quantity(drive.mean, 'N m')}" if np.isfinite(drive.mean) else ""
     yield Tile("largest torque of the drive", labels.quantity(drive.peak, "N m"), within=mean)
     if np.isfinite(spread := float(response["objective_spread"])):
-        yield Tile("cycle-to-cycle std. dev. of f", labels.quantity(spread, unit, 2))
+        shown = labels.quantity(spread, str(response["objective"].attrs["units"]), 2)
+        yield Tile("cycle-to-cycle std. dev. of f", shown)
 
 
 def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Trust]:
