@@ -40,8 +40,12 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     states = 2 * (coordinate_count(scene) - scene.bristles)
     bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
     open_joints = len(scene.contact_labels())
-    method = f"{integrator_of(scene)}, rtol {scene.numerics.rtol:g}"
-    turns = f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged"
+    numbers = scene.numerics
+    method = f"{integrator_of(scene)}, rtol {numbers.rtol:g}"
+    turns = f"{numbers.transient_revolutions} transient + {numbers.averaged_revolutions} averaged revolutions"
+    if (error := numbers.target_error) is not None:
+        method = f"{integrator_of(scene)}, f to {100 * error:g} %"
+        turns = "rtol and revolutions as needed"
     effects = scene.effects_on()
     if detailed():
         from hpcclear.dynamics import sizing
@@ -63,7 +67,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         _assembly(scene)  # refuses what does not close
         rows = [
             ("effects", _few(effects)),
-            ("method", f"{method}; {turns} revolutions"),
+            ("method", f"{method}; {turns}"),
             *_speeds(scene)[:2],
             *([("MPI", _mpi(ranks))] if cost or is_launched() else []),
         ]
