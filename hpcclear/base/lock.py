@@ -39,7 +39,8 @@ class Holder(NamedTuple):
     def this_process(cls) -> "Holder":
         """The running process."""
         pid, (job, restart) = os.getpid(), (os.environ.get(name, "") for name in _SLURM)
-        return cls(socket.gethostname(), _boot(), pid, _started(pid), job, restart)
+        (started,) = host.process_fields(pid)[19:20] or [""]
+        return cls(socket.gethostname(), _boot(), pid, started, job, restart)
 
     @classmethod
     def parse(cls, text: bytes) -> "Holder | None":
@@ -71,11 +72,6 @@ def _boot() -> str:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:
         return ""
-
-
-def _started(pid: int) -> str:
-    found = host.process_fields(pid)
-    return found[19] if len(found) > 19 else ""
 
 
 def _alive(pid: int, started: str) -> bool:

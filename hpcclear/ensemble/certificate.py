@@ -190,17 +190,13 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
         asked = [one for one in every if one.first < count]
         for one, seen in zip(asked, (yield asked), strict=True):
             book.seen.setdefault(one.off, []).append(seen)
-        pending = [one for one in pending if one and _decidable(book, one)]
+        # where too many have failed more decide nothing
+        known = [one for one in pending if one and np.isfinite(book.changes(one).mean.value)]
+        pending = [one for one in known if book.verdict(one) is Verdict.UNDECIDED]
         if count >= book.plan.most:
             return
         count = min(2 * count, book.plan.most)
         pending = _afforded(book, pending, count, budget)
-
-
-def _decidable(book: Book, off: Variant) -> bool:
-    """Whether more replicates may decide a change: not where too many have failed."""
-    known = bool(np.isfinite(book.changes(off).mean.value))
-    return known and book.verdict(off) is Verdict.UNDECIDED
 
 
 def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> list[Variant]:

@@ -103,6 +103,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     reduced = trial.variant(found.recommended).scene
     three = [one[:3] for one in changes]
     seen = [book.all(off) for off in variants]
+    every = [one.objective for one in seen]
     findings = [[one.verdict(plan.tolerance) for one in own] for own in three]
     data: dict[str, Array] = {
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
@@ -116,9 +117,9 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "work": np.array([book.work(off) for off in variants]),
         "evaluations": np.array([float(one.evaluations.mean()) for one in seen]),
         "coordinates": np.array([coordinate_count(trial.variant(off).scene) for off in variants]),
-        "samples": np.array([one.objective.size for one in seen]),
-        "failed": np.array([int(np.isnan(one.objective).sum()) for one in seen]),
-        "objective": np.array([_mean(one.objective) for one in seen]),
+        "samples": np.array([f.size for f in every]),
+        "failed": np.array([int(np.isnan(f).sum()) for f in every]),
+        "objective": np.array([np.nanmean(f) if np.isfinite(f).any() else np.nan for f in every]),
     }
     coords = {
         "variant": np.arange(len(variants)),
@@ -128,10 +129,6 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     attrs = {**attributes, "tolerance": plan.tolerance, "confidence": plan.confidence}
     attrs |= {"reduced_scene": reduced.to_toml(), "kept": json.dumps(trial.kept)}
     return dataset.dataset("effects", coords, data, attrs, objective=trial.scene.objective)
-
-
-def _mean(values: Array) -> float:
-    return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
 def _refuse_zero(scene: Scene, whole: VariantResult) -> None:

@@ -64,16 +64,18 @@ def of_designs(run: StudyRun, choices: Sequence[Choice]) -> Result:
     result: Result = {name: np.full(len(choices), np.nan) for name in ("worst", "worst_corner")}
     result["searched_at"] = np.full((len(choices), len(names)), np.nan)
     result["tried"] = np.zeros(len(choices), np.int64)
+    hidden = (
+        " averaged ",
+        " best ",
+        " candidate ",
+        " paper ",
+    )  # all but ends, points of the front, the baseline
+    shown = [k for k, one in enumerate(choices) if not any(word in one.name for word in hidden)]
     for case in run.study.cases:
-        rows = [k for k, one in enumerate(choices) if one.case == case.name and _named(one.name)]
+        rows = [k for k in shown if choices[k].case == case.name]
         if rows:
             _of_case(run, [choices[k] for k in rows], rows, names, result)
     return result
-
-
-def _named(name: str) -> bool:
-    """Whether a design is one that is shown: an end or a point of the front, or the baseline."""
-    return not any(word in name for word in (" averaged ", " best ", " candidate ", " paper "))
 
 
 def _of_case(
