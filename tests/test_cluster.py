@@ -364,7 +364,8 @@ def test_ranks_end_with_their_launcher_also_a_single_one_and_behind_a_shell(
     job = began([str(MPIEXEC), "-n", str(ranks), *words])
     until_it_saves(job, output)
     known = list(ranks_of(job).values())
-    proxies = [int(number) for number in _children(job.pid)]
+    children = Path(f"/proc/{job.pid}/task/{job.pid}/children").read_text()
+    proxies = [int(number) for number in children.split()]
     assert proxies
     for number in proxies:
         os.kill(number, signal.SIGKILL)
@@ -373,7 +374,3 @@ def test_ranks_end_with_their_launcher_also_a_single_one_and_behind_a_shell(
         assert time.monotonic() < patience, "a rank lives on"
         time.sleep(0.1)
     job.communicate(timeout=crowded(30.0))
-
-
-def _children(process: int) -> list[str]:
-    return Path(f"/proc/{process}/task/{process}/children").read_text().split()

@@ -48,13 +48,13 @@ def allowed(row):
 TABLE = pairwise_table(FACTORS, allowed)
 
 
-def name_of(row):
-    return "-".join(str(level)[:9] for level in row.values())
-
-
 # each row compiles a stepper of its own: the short profile takes some of them
 ROWS = [
-    pytest.param(row, id=name_of(row), marks=[] if k % 4 == 1 else pytest.mark.full)
+    pytest.param(
+        row,
+        id="-".join(str(level)[:9] for level in row.values()),
+        marks=[] if k % 4 == 1 else pytest.mark.full,
+    )
     for k, row in enumerate(TABLE)
 ]
 

@@ -24,11 +24,7 @@ FACTORS = {
 }
 
 
-def anything(row: dict) -> bool:
-    return True
-
-
-TABLE = pairwise_table(FACTORS, anything)
+TABLE = pairwise_table(FACTORS, lambda row: True)
 
 
 def scene_of(name: str, **changes) -> Scene:

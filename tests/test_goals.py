@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-import xarray as xr
 from commands import overrides, run
 from margins import fewest
 from scipy import stats
@@ -199,12 +198,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, output
 
 
-def verified(folder: Path) -> xr.Dataset:
-    return opened.read(folder / "verification.nc", "verification")
-
-
 def test_alpha_and_beta_have_the_least_of_what_was_asked_for(study: tuple[Path, str]) -> None:
-    found = verified(study[0])
+    found = opened.read(study[0] / "verification.nc", "verification")
     for case in ("heavy", "calm"):
         own = found.isel(
             design=[k for k, one in enumerate(found["case"].to_numpy()) if one == case]

@@ -22,12 +22,9 @@ SHOWN = 24.5e-3 / 96
 """m of a unit of the program Linkage, of which it shows millimetres."""
 
 
-def thousandths(value):
-    return digits(round(1000 * value))
-
-
 def joint(name, place, flags=0, angle=0.0, slot=()):
-    return ",".join([DIGITS[flags] + name, name, *map(thousandths, (*place, angle)), *slot])
+    numbers = [digits(round(1000 * value)) for value in (*place, angle)]
+    return ",".join([DIGITS[flags] + name, name, *numbers, *slot])
 
 
 def link(kind, name, joints, title=""):

@@ -9,7 +9,7 @@ from margins import at_most
 from scipy import stats
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.points import latin_hypercube, read_points
 from hpcclear.scene.sampling import monte_carlo
@@ -106,10 +106,6 @@ def distributed_as(column: np.ndarray, law: Callable[[np.ndarray], np.ndarray]) 
     at_most(stats.kstest(column, law).statistic, stats.kstwo.isf(1e-4, len(column)))
 
 
-def _with_distribution(**entries: object) -> Scene:
-    return ROBUST.with_({"study.random.m2": entries, "study.cases.robust": ["C", "m2"]})
-
-
 @pytest.mark.parametrize(
     ("entries", "law"),
     [
@@ -126,7 +122,12 @@ def _with_distribution(**entries: object) -> Scene:
 def test_random_inputs_have_their_distribution(
     entries: dict[str, object], law: stats.rv_continuous, shift: int
 ) -> None:
-    scene = _with_distribution(**entries).with_({"study.seed": 1 + shift})
+    changes = {
+        "study.random.m2": entries,
+        "study.cases.robust": ["C", "m2"],
+        "study.seed": 1 + shift,
+    }
+    scene = ROBUST.with_(changes)
     points = monte_carlo(scene, 50_000, random=("m2",), design=DESIGN)
     assert points.names == ("m2", "u2", "I2", "m3")
     column = points.column("m2")

@@ -102,10 +102,6 @@ def test_many_ranks_stay_busy():
     assert simulate(tenfold(64 * 400, 0.05), 64, 1) > 0.95
 
 
-def records(samples: list[int]) -> np.ndarray:
-    return np.array([(sample,) for sample in samples], [("sample", np.int64)])
-
-
 def test_a_desk_knows_its_samples_when_the_worker_raises():
     class Failing(SimulatedWorker):
         def advance(self, seconds: float) -> np.ndarray:
@@ -123,7 +119,7 @@ def test_a_desk_knows_its_samples_when_the_worker_raises():
 def test_a_worker_may_only_return_what_it_was_given_and_once(strange):
     class Confused(SimulatedWorker):
         def advance(self, seconds: float) -> np.ndarray:
-            return records(strange)
+            return np.array([(sample,) for sample in strange], [("sample", np.int64)])
 
     queue = WorkQueue(Confused(1))
     queue.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
