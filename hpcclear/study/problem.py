@@ -14,10 +14,8 @@ from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case, Goal
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import snapped
-from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import offsets, unit_lhs
 from hpcclear.scene.streams import generator, sobol
-from hpcclear.scene.study import Study
 from hpcclear.statistics.random.inputs import DerivedInput, RandomVariable
 from hpcclear.statistics.random.moments import Drawn, RobustObjective
 from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -112,7 +110,12 @@ class _Averages:
     def averaged(
         self, model: Piecewise, probes: Array, draws: Drawn | None = None
     ) -> RobustObjective:
-        laws = [_inner(self.study, row) if self.moving else row.law for row in self.rows]
+        laws = [row.law for row in self.rows]
+        if self.moving:  # as the domain of the surrogate has them for all designs
+            reach = [self.study.reach(row) if row.absolute else (0.0, 0.0) for row in self.rows]
+            laws = [
+                quantiles.Uniform((low + high) / 2.0, (high - low) / 2.0) for low, high in reach
+            ]
         each = zip(self.rows, laws, strict=True)
         inputs = [RandomVariable(row.name, law, not row.absolute) for row, law in each]
         variables = [self.study.variable(name) for name in self.study.optimisation]
@@ -169,12 +172,6 @@ def problem_of(
     return SwarmProblem(
         averages.names, region, objective, scene, study.case(case), points, averages.independent, further
     )  # fmt: skip
-
-
-def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:
-    """Ends of a distribution that depends on the design, as the domain of the surrogate has them for all."""
-    low, high = study.reach(row) if row.absolute else (0.0, 0.0)
-    return quantiles.Uniform((low + high) / 2.0, (high - low) / 2.0)
 
 
 def _ratio(scene: Scene, inertia: str) -> DerivedInput:

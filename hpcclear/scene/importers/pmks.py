@@ -85,7 +85,10 @@ def _project(query: str, file: File) -> Drawing:
     if len(fields) < 7:
         file.refuse(len(fields), "has fewer fields than a project")
     flags, _, integers, kinds, *rest = fields
-    first, second = _ends(rest, file)
+    empty = [k for k, one in enumerate(rest) if one == ""]  # joints and links end at these
+    if len(empty) < 2:
+        file.refuse(len(rest), "has no joints or no links")
+    first, second, *_ = empty
     limit(max(first, second - first) // 2, file.key)
     joints = [_joint(row, file) for row in rest[:first]]
     rows = rest[first + 1 : second]
@@ -106,14 +109,6 @@ def _project(query: str, file: File) -> Drawing:
     forces = [row for row in rest[second + 1 : -1] if row]
     notes = [f"Not read: {len(forces)} forces of the project"] if forces else []
     return _drawing(joints, links, speed, size, file, notes)
-
-
-def _ends(rest: Sequence[str], file: File) -> tuple[int, int]:
-    """Where the joints and the links end: at empty fields."""
-    empty = [k for k, one in enumerate(rest) if one == ""]
-    if len(empty) < 2:
-        file.refuse(len(rest), "has no joints or no links")
-    return empty[0], empty[1]
 
 
 def _number(token: str, file: File, plain: bool = False) -> int:
