@@ -195,7 +195,7 @@ def test_a_result_carries_what_files_held(tmp_path):
     np.testing.assert_allclose(
         y / 24.0, (kinds_of_tables.compressed(3.6 * x) - 1.0) / 7.0, atol=0.01
     )
-    assert drawn["words"] == "-219.9 N to 0 N"  # of 7 bar on a bore of 20 mm
+    assert drawn["words"] == "-219.9 to 0 N"  # of 7 bar on a bore of 20 mm
 
 
 @pytest.mark.parametrize(

@@ -177,4 +177,4 @@ def test_what_a_scene_is_about_stands_on_page_and_sheet(tmp_path: Path) -> None:
         assert any(text in line for line in texts)
     assert screen_of(content).title == ABOUT["title"]
     assert any("C uniform" in text for text in sheet.assumptions)
-    assert any("m2 0.105 kg to 0.42 kg" in text for text in sheet.limits)
+    assert any("m2 0.105 to 0.42 kg" in text for text in sheet.limits)

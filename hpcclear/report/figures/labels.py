@@ -187,7 +187,8 @@ def between(low: float, high: float, units: str) -> str:
         ends = quantities((low, high), units, digits)
         if ends[0] != ends[1]:
             break
-    return " to ".join(dict.fromkeys(ends))
+    unit = " ".join(["", *ends[1].split(" ")[1:]])
+    return ends[1] if ends[0] == ends[1] else f"{ends[0].removesuffix(unit)} to {ends[1]}"
 
 
 def stated(value: float, low: float, high: float, units: str) -> tuple[str, str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.report.figures.labels import quantity
+from hpcclear.report.figures.labels import between, quantity
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
@@ -171,8 +171,9 @@ def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
     (fresh,) = quantiles(lives["clearance"].isel(cycle=0).values, np.array([0.5]))
     for k, name in enumerate(texts_in(lives, "joint")):
         new = quantity(float(fresh[k]), "m")
-        low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
-        rows.append((name, new, middle, f"{low} to {high}" if low != high else ""))
+        low, middle, high = map(float, at_end[:, k])
+        ends = between(low, high, "m") if low < high else ""
+        rows.append((name, new, quantity(middle, "m"), ends))
     return rows
 
 
