@@ -366,11 +366,17 @@ def test_dates_that_are_none_are_refused(dates, reason):
         seconds_of(dates, 2)
 
 
-@pytest.mark.parametrize("dates", [(), ("2026-01-01",)])
-def test_a_limit_without_dates_is_refused_before_anything_is_simulated(tmp_path, scene, dates):
-    words = {"signal": [SCENE] * max(len(dates), 1), "date": dates, "limit": "100 um"}
-    with pytest.raises(InputError, match="two dates"):
-        hpcclear.identify(scene, UNKNOWN, output=tmp_path / "identify.nc", **words)
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [({"limit": "1 mm"}, "two dates"), ({"limit": "1 mm", "date": "2026-01-01"}, "two dates"),
+     ({"resonance": "0"}, "above 0 Hz"), ({"resonance": "5000:-3"}, "above 0"), ({"band": "-1:50"}, "at least 0"),
+     ({"angle_error": "-5 deg"}, "at least 0"), ({"gain_error": -0.1}, "at least 0")],
+)  # fmt: skip
+def test_words_without_sense_are_refused_before_anything_is_simulated(
+    tmp_path, scene, words, reason
+):
+    with pytest.raises(InputError, match=reason):
+        hpcclear.identify(scene, UNKNOWN, SCENE, output=tmp_path / "identify.nc", **words)
     assert not list(tmp_path.iterdir())
 
 

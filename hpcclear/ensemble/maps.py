@@ -37,17 +37,16 @@ def axis(scene: Scene, words: str, option: str = "--x") -> tuple[str, tuple[str,
         raise InputError(option, words, "is not PATH=LO:HI:N", example)
     name, *ends, count = found.groups()
     paths = paths_of(scene, name)
-    return (
-        name,
-        paths,
-        np.linspace(*range_of(option, words, ends, scene.unit(paths[0])), int(count)),
-    )
+    bounds = range_of(option, words, ends, scene.unit(paths[0]))
+    return name, paths, np.linspace(*bounds, int(count))
 
 
-def range_of(key: str, words: str, ends: Sequence[str], unit: str) -> tuple[float, float]:
+def range_of(
+    key: str, words: str, ends: Sequence[str], unit: str, least: float | None = None
+) -> tuple[float, float]:
     """Two bounds in rising order, each in SI or with a unit; raises InputError at `key`, which has `words`."""
     with at(key, words):
-        return Quantity(unit).range([_number(end, unit) for end in ends], "")
+        return Quantity(unit, least=least).range([_number(end, unit) for end in ends], "")
 
 
 def _number(words: str, unit: str) -> float:
@@ -62,10 +61,12 @@ def _number(words: str, unit: str) -> float:
     return value
 
 
-def number_of(key: str, words: str, unit: str) -> float:
-    """A plain number in SI, or one with a unit; raises InputError at `key` where it is neither."""
+def number_of(
+    key: str, words: str, unit: str, above: float | None = None, least: float | None = None
+) -> float:
+    """A plain number in SI, or one with a unit; raises InputError at `key` where it is neither, or beyond a bound."""
     with at(key, words):
-        return Quantity(unit).number(_number(words, unit))
+        return Quantity(unit, above, least=least).convert(_number(words, unit))
 
 
 def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]:

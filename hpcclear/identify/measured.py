@@ -94,7 +94,7 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     if scene.template is None:
         remedy = "Write the load of a linkage as a curve in its scene"
         raise InputError("--pressure", words, "only a slider-crank has a piston", remedy)
-    area = number_of("--pressure", size, "m^2")
+    area = number_of("--pressure", size, "m^2", above=0.0)
     found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage))
     if not found.synchronised:
         raise InputError("--pressure", str(path), "has no crank angle", 'Add "crank_angle [deg]"')

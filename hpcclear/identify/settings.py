@@ -73,15 +73,15 @@ class Settings:
 
     @property
     def sensor(self) -> Sensor:
-        """The sensor; raises InputError where its words are no numbers."""
+        """The sensor; raises InputError where a word is no such number."""
         low, high = (self.band or "").partition(":")[::2]
         place, quality = (self.resonance or "").partition(":")[::2]
         return Sensor(
-            range_of("--band", self.band or ":", (low or "0", high or "1e12"), "Hz"),
-            number_of("--resonance", place or "1e12", "Hz"),
-            number_of("--resonance", quality or "10", "1"),
-            self.gain_error,
-            number_of("--angle-error", str(self.angle_error), "rad"),
+            range_of("--band", self.band or ":", (low or "0", high or "1e12"), "Hz", least=0.0),
+            number_of("--resonance", place or "1e12", "Hz", above=0.0),
+            number_of("--resonance", quality or "10", "", above=0.0),
+            number_of("--gain-error", str(self.gain_error), "", least=0.0),
+            number_of("--angle-error", str(self.angle_error), "rad", least=0.0),
         )
 
     def limit_in(self, unit: str) -> float | None:
