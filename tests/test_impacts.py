@@ -282,6 +282,8 @@ def test_bands_that_the_drive_does_not_reach_are_refused(changes, words):
         ({"numerics.levels": [100.0 * 2**k for k in range(5)]}, "4"),
         ({"numerics.levels": [1e3], "numerics.target_error": 0.01}, "target_error"),
         ({"numerics.objective": "frame-force-level-at-1kHzz"}, "not a known objective"),
+        ({"numerics.objective": "frame-force-level-at-0Hz"}, "from 1 to 100000 Hz"),
+        ({"numerics.objective": f"contact-force-level-at-{'9' * 400}Hz"}, "from 1 to 100000 Hz"),
     ],
 )
 def test_levels_that_cannot_be_recorded_are_refused(changes, words):

@@ -176,18 +176,25 @@ def band_of(frequency: float) -> float:
     return float(1000.0 * 10.0 ** (round(10.0 * np.log10(frequency / 1000.0)) / 10.0))
 
 
+LOWEST, HIGHEST = 1.0, 1e5
+"""Frequencies that levels may be of, Hz."""
+
 LEVEL = re.compile(r"(frame|contact)-force-level-at-(\d+(?:\.\d+)?)-?(k?)Hz")
 """Names of objectives that are a third-octave level: "frame-force-level-at-1.25kHz"."""
 
 
 def level_of(name: re.Match[str]) -> Objective:
-    """The third-octave level of a force, dB re 1e-6 N, of a name as `LEVEL` has it."""
+    """The third-octave level of a force, dB re 1e-6 N, of a name as `LEVEL` has it; raises InputError at a frequency that none has."""
     return _level(name[0], name[1], float(name[2]), name[3])
 
 
 @cache
 def _level(name: str, force: str, number: float, kilo: str) -> Objective:
-    made = partial(Objective, name=name, band=band_of(number * (1000.0 if kilo else 1.0)))
+    frequency = number * (1000.0 if kilo else 1.0)
+    if not LOWEST <= frequency <= HIGHEST:
+        reason = f"its frequency must be from {LOWEST:g} to {HIGHEST:g} Hz"
+        raise InputError("objective", name, reason, "Write another frequency")
+    made = partial(Objective, name=name, band=band_of(frequency))
     at = f"at {number:g} {kilo}Hz, dB re 1e-6 N"
     if force == "frame":
         words = f"third-octave level of the force on the frame {at}"

@@ -4,12 +4,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, StrictBool
 
+from hpcclear.base.objectives import HIGHEST, LOWEST
 from hpcclear.base.outcome import MAX_BANDS
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.cases import ObjectiveName
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
 
-Frequency = Annotated[float, Quantity("Hz", least=1.0, most=1e5)]
+Frequency = Annotated[float, Quantity("Hz", least=LOWEST, most=HIGHEST)]
 
 
 class Numerics(Table):
