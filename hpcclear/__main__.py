@@ -14,6 +14,9 @@ _LOADED = 500_000
 def main() -> None:
     """Run a command; ends the process with its exit code."""
     _collect_after_loading()
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed before
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - stays open
     from hpcclear.cli import main as command
 
     try:

@@ -130,6 +130,13 @@ def test_both_entry_points_give_version_and_help():
         assert "Example" in done.stdout
 
 
+@pytest.mark.parametrize(("place", "code"), [("/dev/full", 1), ("&-", 0)])
+def test_an_output_that_takes_nothing_leads_to_no_traceback(place, code):
+    words = f"{sys.executable} -m hpcclear check jobs/quickstart.toml --no-cost >{place}"
+    done = subprocess.run(["sh", "-c", words], cwd=ROOT, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, b"Traceback" in done.stderr) == (code, False), done.stderr
+
+
 @pytest.mark.parametrize(("former", "words"), OLD.items())
 def test_a_former_name_of_a_command_is_one_and_is_not_listed(former, words):
     old, new = (CliRunner().invoke(cli, [*one.split(), "--help"]) for one in (former, words))

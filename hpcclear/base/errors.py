@@ -14,7 +14,6 @@ from hpcclear.base.plain import plain
 MOST_LISTED = 20
 LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 
-_NO_HANDLES = (errno.EMFILE, errno.ENFILE)
 _BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
 
 
@@ -145,6 +144,7 @@ _DISK_ERRORS = {
     errno.ENOSPC: "Free some space (or remove files, where there may be only so many), then run the same command again",
     errno.EDQUOT: "Your quota is used up: free some space, then run the same command again",
     errno.EMFILE: "Raise the limit of open files (ulimit -n), then run the same command again",
+    errno.ENFILE: "Close other programs, then run the same command again",
     errno.EFBIG: "Raise the file size limit (ulimit -f), then run the same command again",
 }
 
@@ -196,9 +196,9 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
     chain = list(_chain(error))
     for one in chain:
         number = one.errno if isinstance(one, OSError) else None
-        if number in _NO_HANDLES:
-            remedy = "Raise the limit (ulimit -n), then run the same command again"
-            return LimitError(f"too few file handles. {remedy}")
+        if isinstance(one, OSError) and number in _DISK_ERRORS:
+            place = one.filename or "output"
+            return LimitError(f"{place}: {os.strerror(number)}. {_DISK_ERRORS[number]}")
         if isinstance(one, OSError) and number in _BAD_NAMES and one.filename is not None:
             name = one.filename
             name = os.fsdecode(name) if isinstance(name, bytes) else str(name)

@@ -184,7 +184,7 @@ LEVEL = re.compile(r"(frame|contact)-force-level-at-(\d+(?:\.\d+)?)-?(k?)Hz")
 
 
 def level_of(name: re.Match[str]) -> Objective:
-    """The third-octave level of a force, dB re 1e-6 N, of a name as `LEVEL` has it; raises InputError at a frequency that none has."""
+    """The third-octave level of a force, dB re 1e-6 N, by a match of `LEVEL`; InputError where none has its frequency."""
     return _level(name[0], name[1], float(name[2]), name[3])
 
 
