@@ -151,7 +151,7 @@ def kinds() -> list[Kind]:
         ("units in a second row, in brackets, beside names", "l.csv",
          text([["part", "m2", "C", "drive.speed"], ["-", "[g]", "[mm]", "[rpm]"], ["A", *DESIGNS[0]], ["B", *DESIGNS[1]]]),
          IN_SI),
-        ("units behind a slash", "m.csv", text([["m2 / g", "C / mm", "drive.speed / min⁻¹"], *DESIGNS], ";"), IN_SI),
+        ("units behind a slash", "m.csv", text([["m2 / g", "C/mm", "drive.speed/min⁻¹"], *DESIGNS], ";"), IN_SI),
         ("units in round brackets", "n.csv", text([["m2 (g)", "C (mm)", "drive.speed (rpm)"], *DESIGNS]), IN_SI),
         ("units in the cells", "o.csv", text([["m2", "C", "drive.speed"], ["210 g", "0.3 mm", "5000 rpm"], ["180 g",
         "250 µm", "4000 1/min"]]),

@@ -19,7 +19,7 @@ SECONDS = ["0.0", "0.1", "0.2", "0.3", "0.4"]
 HEADINGS = {
     "brackets": ("{} [{}]", None, False), "round brackets": ("{} ({})", None, False), "a slash": ("{} / {}", None, False),
     "in words": ("{} in {}", None, False), "a second row": ("{}", "{}", False), "brackets below": ("{}", "[{}]", False),
-    "the cells": ("{}", None, True),
+    "the cells": ("{}", None, True), "a slash without spaces": ("{}/{}", None, False),
 }  # fmt: skip
 """Heading with name and unit, unit below, and whether cells have units."""
 FILES = {
@@ -108,8 +108,9 @@ def test_each_use_refuses_a_cell_alike(use, tmp_path, monkeypatch):
 
 
 def test_a_number_of_a_table_is_not_doubted_in_an_entry(tmp_path):
-    (tmp_path / "t.csv").write_text("wear [µm],run\n1.234,1\n12.5,2\n")
+    (tmp_path / "t.csv").write_text("wear [µm],run m/s\n1.234,1\n12.5,2\n")
     sheet = read(tmp_path / "t.csv")
+    assert sheet.names == ("wear", "run m/s")  # no run m in s
     texts = sheet.entries(sheet.columns[0])
     assert [to_si(one, "m") for one in texts] == [1.234e-6, 12.5e-6]
 

@@ -215,7 +215,7 @@ def decimal_of(cell: str, comma: bool) -> float:
 
 
 _HEADING = re.compile(
-    r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|\s[/,]\s*(\S.{0,39}))?\s*",
+    r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|(?:\s,|/)\s*(\S.{0,39}))?\s*",
     re.DOTALL,
 )
 NOTHING = ("", "-", "–", "—", "na", "n/a", "nan", "null", "none")
@@ -307,13 +307,15 @@ def _row(
 
 
 def parsed_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: ``C [mm]``, ``C (mm)``, ``C / mm``, ``C, mm``, ``C in mm``; the unit as written."""
+    """Name and unit of a heading: ``C [mm]``, ``C (mm)``, ``C / mm``, ``C/mm``, ``C , mm``, ``C in mm``, as written."""
     found = _HEADING.fullmatch(heading)
     assert found is not None  # it takes anything
     name, bracket, round_, rest = found.groups()
     if bracket is not None:
         return name, bracket
     unit = round_ if round_ is not None else rest
+    if heading[len(name) :].startswith("/") and " " in name and is_unit(heading.split(" ")[-1]):
+        return heading, ""  # "speed m/s"
     if unit is not None and (is_unit(unit) or not unit):
         return name, unit
     behind = re.fullmatch(r"(.+?)\s+in\s+(\S.*)", heading)
