@@ -195,6 +195,8 @@ def kinds() -> list[Kind]:
         "page of markup"),
         ("a heading that is none of the scene", "D.csv", text([["m2 [g]", "clearence [mm]"], ["210", "0.3"]]),
         "neither a variable"),
+        ("words for an entry of the scene", "E.csv", text([["effects.friction.law", "m2 [g]"], ["coulomb", "210"]]),
+         "neither a variable"),
     ]  # fmt: skip
     designs = [
         Kind(words, name, data, "designs", expected) for words, name, data, expected in found

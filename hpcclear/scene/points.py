@@ -313,12 +313,12 @@ def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tu
     named = {**SHORT_NAMES, **of_study}
     paths = tuple(path for path in named.get(column.name, (column.name,)) if path in numbers)
     if not paths:
-        if column.name.lower() in LABELS or sheet.is_text(column):
+        of_scene = any(column.name.startswith(f"{table}.") for table in Scene.model_fields)
+        if column.name.lower() in LABELS or (sheet.is_text(column) and not of_scene):
             return ()
         if re.search(r"[\s\[\]]", column.name):
             remedy = 'Write a name, and its unit as in "C [mm]"'
             raise InputError(key, column.heading, "is not a column name", remedy)
-        remedy = nearest(column.name, (*named, *numbers))
         reason = "is neither a variable nor a number of this scene"
-        raise InputError(key, column.name, reason, remedy)
+        raise InputError(key, column.name, reason, nearest(column.name, (*named, *numbers)))
     return paths
