@@ -152,12 +152,16 @@ class Units:
         self._si = list(asked) == [SI]
         self._asked = [] if self._si else list(asked)
         self._scene = None if self._si else scene_of(content)
-        known = {str(v.attrs.get("units", "")) for v in content.variables.values()}
-        for unit in self._asked:
-            if not any(fits(unit, one) for one in known if one not in ("", "1")):
-                listed = ", ".join(sorted(map(labels.plain, known - {"", "1"})))
+        known = {str(v.attrs.get("units", "")) for v in content.variables.values()} - {"", "1"}
+        fitting = {unit: [one for one in known if fits(unit, one)] for unit in self._asked}
+        for unit, own in fitting.items():
+            if not own:
+                listed = ", ".join(sorted(map(labels.plain, known)))
                 reason = "it fits no quantity of this result"
                 raise InputError("--unit", unit, reason, f"Units of its quantities: {listed}")
+            if len(same := [one for one in fitting if fitting[one] == own]) > 1:
+                reason = "these are units of the same quantities"
+                raise InputError("--unit", ", ".join(same), reason, "Keep one of them")
 
     def shown(self, variable: Variable) -> tuple[np.ndarray, str]:
         """Values and their unit; codes as words, without one."""

@@ -49,6 +49,8 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
         reason, remedy = "it is not a regular file", "Choose another name"
         if stat.S_ISREG(about.st_mode):
             reason = "the existing file was not written by hpcclear, or it was cut off"
+            if path.suffix.lower() == ".csv":  # known by its headings alone
+                reason = "the existing table has other headings than this one"
             remedy += ", or move that file away"
         raise InputError("output", str(path), reason, remedy)
 
