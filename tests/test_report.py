@@ -172,6 +172,8 @@ def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="no result file"):
         write_report(tmp_path)
     opened.write(data.samples(), tmp_path / "samples.nc")
+    with pytest.raises(InputError, match=r"End the name in \.html"):
+        write_report(tmp_path, output="page.txt")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
         write_report(tmp_path)

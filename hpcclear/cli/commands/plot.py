@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     Drawings = Mapping[str, Callable[[], Figure]]
 
 One = TypeVar("One")
+KINDS = ("png", "svg", "pdf")
 
 
 @cli.command("look", "Draw figures and films of results.")
@@ -30,7 +31,7 @@ One = TypeVar("One")
 )
 @cli.option(
     "--format", "Format of figures in a directory.", "png",
-    type=click.Choice(["png", "svg", "pdf"]), name="kind",
+    type=click.Choice(KINDS), name="kind",
 )  # fmt: skip
 @cli.option(
     "--design NAME", "Design of which responses are drawn. Repeatable. Default: all, beside each other.",
@@ -45,7 +46,7 @@ One = TypeVar("One")
 @cli.option("--style FILE", "Style sheet of matplotlib (.mplstyle).", name="sheet", type=cli.PATH)
 @cli.option("--theme", "Colours of page and curves.", "light", type=click.Choice(["light", "dark"]))
 @cli.option("--animation FILE", "Film of the motion: .gif, or .mp4 with ffmpeg.", type=cli.PATH)
-@cli.option("--seconds", "Length of the film.", 6.0, type=cli.Amount(min=0.0))
+@cli.option("--seconds", "Length of the film.", 6.0)
 @cli.option(
     "--revolutions", "Revolutions in the film, the last ones of the response.", 2,
     type=click.IntRange(min=1),
@@ -70,11 +71,14 @@ def run(
     Example: hpcclear plot results/response.nc --figure orbit --size 85mm -o orbit.pdf
     """
     from hpcclear.plugins import trusting
+    from hpcclear.report import save
     from hpcclear.report.figures.catalogue import drawings
     from hpcclear.report.figures.labels import in_units_of
     from hpcclear.report.figures.printing import printing
     from hpcclear.report.html.content import read
 
+    cli.check_mode("--animation", animation is not None, its_own=("seconds", "revolutions"))
+    cli.check_mode("--output", output is not None, its_own=("kind", "texts", *look))
     content = read(*places)
     for name in designs:
         _known("--design", name, content.responses)
@@ -88,9 +92,14 @@ def run(
             if animation is None:
                 cli.show(f"figures of {', '.join(map(str, places))}: {', '.join(every)}")
             return
+        single = _is_single(output, len(chosen), kind)
         with printing(texts=dict(map(_label, texts)), **look):
             drawn = _drawn(chosen, bool(names))
-        _save(drawn, output, kind)
+        if not single:
+            output.mkdir(parents=True, exist_ok=True)
+        for name, figure in drawn.items():
+            place = cli.place_of(output) if single else output / f"{name}.{kind}"
+            cli.show(f"figure   {save(figure, place)}")
 
 
 def _film(content: "Content", place: Path, seconds: float, revolutions: int) -> None:
@@ -130,13 +139,12 @@ def _drawn(figures: "Drawings", chosen: bool) -> "dict[str, Figure]":
     return drawn
 
 
-def _save(figures: "Mapping[str, Figure]", output: Path, kind: str) -> None:
-    """Write one figure to a file, or each to a file of a directory."""
-    from hpcclear.report import save
-
-    single = len(figures) == 1 and output.suffix != ""
-    if not single:
-        output.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures.items():
-        place = cli.place_of(output) if single else output / f"{name}.{kind}"
-        cli.show(f"figure   {save(figure, place)}")
+def _is_single(output: Path, figures: int, kind: str) -> bool:
+    """Whether an output is the file of one figure, not a directory; raises InputError where its name contradicts others."""
+    ending = output.suffix.lower().removeprefix(".")
+    if ending in KINDS and figures > 1 and not output.is_dir():
+        reason = f"is the name of one figure, and there are {figures}"
+        raise InputError("--output", str(output), reason, "Name a directory, or one --figure")
+    if figures == 1 and ending and cli.is_given("kind") and ending != kind:
+        raise InputError("--format", kind, f"{output} is of another format", "Drop --format")
+    return figures == 1 and bool(ending)

@@ -38,8 +38,8 @@ def animate(
         reason = "an animation is a gif or an mp4"
         raise InputError("animation", str(place), reason, "End the name in .gif or .mp4")
     if not 1.0 / RATE <= seconds <= LONGEST:
-        reason = f"the length must be {1 / RATE:g} to {LONGEST:g} s"
-        raise InputError("animation", seconds, reason, "Give another length")
+        reason = f"must be from {1 / RATE:g} to {LONGEST:g} s"
+        raise InputError("seconds", seconds, reason, "Give another length")
     program = _ffmpeg(place) if place.suffix.lower() == ".mp4" else ""
     pictures = _pictures(motion.latest(response, revolutions), round(seconds * RATE))
     content = _mp4(pictures, program) if program else _gif(pictures)

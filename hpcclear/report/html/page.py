@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from hpcclear.base.errors import InputError
 from hpcclear.report.answer import answer
 from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html import gallery, picture
@@ -65,6 +66,8 @@ def write_report(
     """
     content, troubles = read(*places), [] if troubles is None else troubles
     path = content.directory / NAME if output is None else Path(output)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError("output", str(path), "a page is html", "End the name in .html")
     with in_units_of(content.attribute("scene")):
         files.write_bytes(path, _page(content, troubles).encode(), _MARK)
     return path
