@@ -212,6 +212,7 @@ def test_a_result_carries_what_files_held(tmp_path):
         ({"bore": "42 mm", "ambient": "1 bar", "diameter": 1}, "diameter = 1: is not a known key"),
         ({"bore": "42 mm", "ambient": "1 bar", "column": "p"}, "belongs to measured values"),
         ({"bore": "0 mm", "ambient": "1 bar"}, "bore = '0 mm': must be above 0"),
+        ({"file": "p.csv#Run"}, "file = .*p.csv#Run': is text, without sheets"),
     ],
 )  # fmt: skip
 def test_curves_that_are_none(row, words, tmp_path):
@@ -220,7 +221,7 @@ def test_curves_that_are_none(row, words, tmp_path):
         with_file(
             load_scene(JOBS / "slider_crank.toml"),
             "effects.slider_load",
-            {"file": str(path), **row},
+            {**row, "file": str(path.parent / row.get("file", path))},
         )
     assert error.value.key.startswith("effects.slider_load")
 

@@ -276,7 +276,7 @@ class RandomInput(NamedInput):
             value = getattr(self, key)
             if key in needed and value is None:
                 raise invalid(f"the distribution {self.distribution!r} needs it", "Add it", key)
-            if key not in needed | further | {"relative"} and value not in (None, False):
+            if key not in needed | further | {"relative"} and value is not None:
                 raise invalid(f"does not belong to {self.distribution!r}", "Remove it", key)
         self._check_cut()
 

@@ -241,6 +241,8 @@ def _read(path: Path, page: str | None, what: str, headed: bool) -> Sheet:
     data = delimited.bytes_of(path, what)
     if data.startswith(delimited.PACKED):
         rows, separator, found = cells_of(path, data, what, page), ";", "Excel workbook"
+    elif page is not None:
+        raise InputError(what, f"{path}#{page}", "is text, without sheets", f"Drop #{page}")
     else:
         rows, separator, found = delimited.rows_of(path, what, data)
     columns, lines, comma = columns_of(path, what, rows, found, separator, headed)

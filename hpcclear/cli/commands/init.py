@@ -56,6 +56,8 @@ def run(
     Example: hpcclear init --import points.csv linkage.toml --sketch linkage.png
     """
     cli.check_mode("--import", imports, ("four_stroke", "compressor", "jobs"), ("unit", "sketch"))
+    cli.check_mode("--jobs", jobs, ("four_stroke", "compressor"))
+    cli.check_mode("--compressor", compressor, ("four_stroke",))
     if imports and not source:
         raise click.UsageError("Missing argument 'SOURCE'.", click.get_current_context())
     if len(source) > imports:
