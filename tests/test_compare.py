@@ -77,6 +77,7 @@ def test_norms_are_those_of_the_errors_that_were_made(response, tmp_path):
         ("time [s],contact_force", "Use one of: contact_force crank_rod, contact_force rod_slider"),
         ("time [s],crank_momnt", "Did you mean 'crank_moment'"),
         ("time [s]", "no series"),
+        ("time [s],crank_moment [N m],crank_moment [kN mm]", "another column is crank_moment"),
     ],
 )
 def test_a_table_that_cannot_be_compared_is_refused(response, tmp_path, head, reason):
@@ -84,6 +85,17 @@ def test_a_table_that_cannot_be_compared_is_refused(response, tmp_path, head, re
     (tmp_path / "m.csv").write_text(f"{head}\n{row}\n{row}\n{row}\n")
     with pytest.raises(InputError, match=re.escape(reason)):
         compare(response, tmp_path / "m.csv")
+
+
+def test_nothing_is_aligned_by_a_constant_and_times_that_fall_are_refused(response, tmp_path):
+    opened.write(response, tmp_path / "r.nc")
+    path = table(tmp_path / "m.csv", {"time [s]": np.arange(3.0), "crank_moment": np.zeros(3)})
+    words = ["compare", str(tmp_path / "r.nc"), str(path)]
+    told = CliRunner().invoke(cli, words).output
+    assert "not aligned, shifted by 0 s" in told
+    assert "nan" not in told
+    table(path, {"time [s]": np.array([0.0, 2.0, 1.0]), "crank_moment": np.zeros(3)})
+    assert "do not rise" in str(CliRunner().invoke(cli, words).exception)
 
 
 def test_a_cell_that_is_no_number_is_named(tmp_path):

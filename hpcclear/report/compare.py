@@ -129,6 +129,8 @@ def compare(
     response, sheet = Results.of(response), read_series(Path(path))
     axis, along = _axis(sheet)
     given = sheet.si(along, AXES[axis], "heading")
+    if axis == "time" and (np.diff(given) < 0.0).any():
+        raise InputError("measured table", str(path), "its times do not rise", "Sort its rows")
     inside = bearings.averaged(response)
     if inside.sum() < 3:
         reason = "no averaged revolution is stored in it"
@@ -173,7 +175,7 @@ def _aligned(
         # the table says where in a revolution, not in which of the simulated ones
         steps: Array = 2.0 * np.pi * np.arange(float(turns))
         return _best(at, simulated, measured, steps), "by crank angle"
-    if how == "correlation":
+    if how == "correlation" and any(map(np.ptp, measured)):  # else no shift is better than another
         shifts = np.linspace(0, span, SHIFTS * turns, endpoint=False)
         return _best(at, simulated, measured, shifts, refine=True), "by the largest correlation"
     return 0.0, NOT_ALIGNED
@@ -198,7 +200,11 @@ def _measured_axis(response: Results, axis: str, given: Array, at: Array, every:
 
 
 def _check_names(names: Mapping[str, str], columns: list[SheetColumn]) -> None:
-    """InputError unless each named column is one of the table's, by its heading or without its unit."""
+    """InputError unless each named column is one of the table's, by its heading or without its unit, and no two are alike."""
+    for k, one in enumerate(columns):
+        if one.name in (other.name for other in columns[:k]):
+            reason = f"another column is {one.name} as well"
+            raise InputError("heading", one.heading, reason, "Keep one, or name one otherwise")
     known = [name for one in columns for name in dict.fromkeys((one.name, one.heading))]
     for name, quantity in names.items():
         if name not in known:

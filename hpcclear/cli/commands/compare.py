@@ -49,7 +49,9 @@ def run(
     chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
     found = compare(dataset.read(file, "response"), measured, align, chosen)
     angular = found.axis == "angle"
-    moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
+    moved = (
+        f"{math.degrees(found.shift) if angular else found.shift:.4g} {'deg' if angular else 's'}"
+    )
     picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
     rows = [
         ("measured points", str(len(found.x))),
@@ -86,6 +88,7 @@ def _norms(one: "ComparedSignal") -> list[tuple[str, str]]:
 
     least, most = (pick(one.by_revolution) * unit.factor for pick in (min, max))
     share = f"{norms['relative_rms']:.3g} of the measured RMS"
+    share = share if one.measured.any() else "where all that was measured is 0"
     return [
         ("RMS error", f"{shown('rms').lstrip('+')}, {share}"),
         ("RMS error by revolution", f"{least:.4g} to {most:.4g} {unit.unit}"),
