@@ -154,8 +154,9 @@ def test_a_measured_pressure_becomes_the_load_of_the_slider(tmp_path, scene):
     place = table(tmp_path / "p.csv", {"crank_angle [deg]": degrees, "p [bar]": pressure})
     curve = np.array(loaded(scene, place, "p=10 cm2").effects.slider_load)
     np.testing.assert_allclose(curve[:, 1], -1e-3 * 1e5 * (2.0 + np.cos(curve[:, 0])), atol=0.5)
-    with pytest.raises(InputError, match="COLUMN=AREA"):
-        loaded(scene, place, "p")
+    for words, reason in (("p", "COLUMN=AREA"), ("q=1 cm2", "column 'q'"), ("p=-1 cm2", "above 0")):
+        with pytest.raises(InputError, match=f"--pressure = .*{reason}"):
+            loaded(scene, place, words)
 
 
 # -- posterior --------------------------------------------------------------------------------------

@@ -169,18 +169,21 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
 
 def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
     """Number and unit of a text, as `to_si` reads it."""
-    shown = target or "1"
     found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= LONGEST else None
     number, unit = found.groups() if found else ("", "")
     if not decided:
         check_thousands(text)
+    bare = f"a number in {target}" if target else "a number"
     if found is None or (unit is not None and not _is_written(text, unit)):
         hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
-        reason = f"the text is not a number with a unit of {shown}"
-        units = f", or a string with a unit{hint}" if target else ""
-        raise UnitError(reason, mended(text) or f"Write a number in {shown}{units}")
+        of, units = (
+            (f" with a unit of {target}", f", or a string with a unit{hint}")
+            if target
+            else ("", "")
+        )
+        raise UnitError(f"the text is not a number{of}", mended(text) or f"Write {bare}{units}")
     if unit is None:
-        raise UnitError("a number in quotes has no unit", f"Drop the quotes of a number in {shown}")
+        raise UnitError("a number in quotes has no unit", f"Drop the quotes of {bare}")
     return number, unit
 
 

@@ -68,7 +68,7 @@ def _identified(
     frequency, sense = _driven(plain, response)
     usual = names_of(response) if settings.advise else ()
     every = tuple(dict.fromkeys((*settings.names, *usual)))
-    units = {name: signal(response, name, "--signal").unit for name in every}
+    units = {name: signal(response, name, "--of").unit for name in every}
     turns = turns_of(plain.linkage)
     how, names = (frequency, turns, sense), settings.names
     tables = [[read_measured(path, n, units[n], *how) for n in names] for path in settings.signals]

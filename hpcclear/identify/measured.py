@@ -45,7 +45,13 @@ class Measured:
 
 
 def read_measured(
-    path: Path, name: str, unit: str, frequency: float, turns: int = 1, sense: int = 1
+    path: Path,
+    name: str,
+    unit: str,
+    frequency: float,
+    turns: int = 1,
+    sense: int = 1,
+    key: str = "--signal",
 ) -> Measured:
     """Read a signal from a table: columns ``time [s]`` or ``crank_angle [deg]``, or both, and signals by their names.
 
@@ -54,7 +60,7 @@ def read_measured(
     """
     sheet = read_series(path)
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
-    values = sheet.si(_column(sheet, name), unit, "heading")
+    values = sheet.si(_column(sheet, name, key), unit, "heading")
     seconds = None if time is None else sheet.si(time, "s", "heading")
     count = is_counted(name)
     if angle is not None:
@@ -95,7 +101,7 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
         remedy = "Write the load of a linkage as a curve in its scene"
         raise InputError("--pressure", words, "only a slider-crank has a piston", remedy)
     area = number_of("--pressure", size, "m^2", above=0.0)
-    found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage))
+    found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage), key="--pressure")
     if not found.synchronised:
         raise InputError("--pressure", str(path), "has no crank angle", 'Add "crank_angle [deg]"')
     share = np.arange(PAIRS) / PAIRS
@@ -107,13 +113,14 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     return scene.with_({"effects.slider_load": pairs})
 
 
-def _column(sheet: Sheet, name: str) -> SheetColumn:
-    """The column of a signal; a table of one signal may call it as it likes."""
-    found = [one for one in sheet.signals if one.name.strip() == name] or sheet.signals
+def _column(sheet: Sheet, name: str, key: str) -> SheetColumn:
+    """The column of an option; a table of one signal may call it as it likes."""
+    named = [one for one in sheet.signals if one.name.strip() == name]
+    found = named or (sheet.signals if key == "--signal" else [])
     if len(found) == 1:
         return found[0]
-    remedy = f"Call one so. It has: {', '.join(one.heading for one in found)}"
-    raise InputError("--signal", sheet.path, f"has no column {name!r}", remedy)
+    remedy = f"Call one so. It has: {', '.join(one.heading for one in sheet.signals)}"
+    raise InputError(key, sheet.path, f"has no column {name!r}", remedy)
 
 
 def _frequency(time: Array, values: Array, nominal: float) -> float:

@@ -126,6 +126,6 @@ def spectra(scene: Scene, response: Results, names: Sequence[str]) -> Array:
     kept = turns >= begin - 2.0 / INSTANTS
     found = []
     for name in names:
-        one = signal(response, name, "--signal")
+        one = signal(response, name, "--of")
         found.append(Spectrum.of(harmonics(turns[kept], one.values[kept], one.counted)).packed())
     return np.array(found)

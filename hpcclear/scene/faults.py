@@ -73,7 +73,8 @@ def _told(said: InputError, location: Location, content: object, more: int = 0) 
     """An error of `invalid` with the whole key of its entry, and what stands there."""
     names, found = _follow(location, content)
     if said.key:
-        below, found = _follow(tuple(said.key.split(".")), found)
+        quoted = isinstance(found, Mapping) and said.key in found
+        below, found = _follow((said.key,) if quoted else tuple(said.key.split(".")), found)
         names += below
     if said.value is not ... and (found is None or isinstance(found, (Mapping, list))):
         found = said.value
@@ -113,6 +114,8 @@ def _follow(location: Location, content: object) -> tuple[tuple[str, ...], Any]:
     """The keys along a location, and what stands there in the raw content (None if nothing does)."""
     names: list[str] = []
     for step in location:
+        if isinstance(content, (str, int, float)):  # what stands for a whole table, as "cost"
+            break
         if isinstance(content, Mapping):
             # Named rows are validated as a list; their position leads back to the name.
             key = list(content)[step] if isinstance(step, int) and step not in content else step
