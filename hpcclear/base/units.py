@@ -176,12 +176,9 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
     bare = f"a number in {target}" if target else "a number"
     if found is None or (unit is not None and not _is_written(text, unit)):
         hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
-        of, units = (
-            (f" with a unit of {target}", f", or a string with a unit{hint}")
-            if target
-            else ("", "")
-        )
-        raise UnitError(f"the text is not a number{of}", mended(text) or f"Write {bare}{units}")
+        reason = "the text is not a number" + (f" with a unit of {target}" if target else "")
+        units = f", or a string with a unit{hint}" if target else ""
+        raise UnitError(reason, mended(text) or f"Write {bare}{units}")
     if unit is None:
         raise UnitError("a number in quotes has no unit", f"Drop the quotes of {bare}")
     return number, unit

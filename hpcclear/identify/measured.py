@@ -45,14 +45,8 @@ class Measured:
 
 
 def read_measured(
-    path: Path,
-    name: str,
-    unit: str,
-    frequency: float,
-    turns: int = 1,
-    sense: int = 1,
-    key: str = "--signal",
-) -> Measured:
+    path: Path, name: str, unit: str, frequency: float, turns: int = 1, sense: int = 1, key: str = "--signal",
+) -> Measured:  # fmt: skip
     """Read a signal from a table: columns ``time [s]`` or ``crank_angle [deg]``, or both, and signals by their names.
 
     `frequency`: of a revolution of the drive in the scene, Hz; `turns`, `sense`: turns of the crank in it, and -1 where the

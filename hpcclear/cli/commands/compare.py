@@ -49,9 +49,7 @@ def run(
     chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
     found = compare(dataset.read(file, "response"), measured, align, chosen)
     angular = found.axis == "angle"
-    moved = (
-        f"{math.degrees(found.shift) if angular else found.shift:.4g} {'deg' if angular else 's'}"
-    )
+    moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.4g} s"
     picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
     rows = [
         ("measured points", str(len(found.x))),
