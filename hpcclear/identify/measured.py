@@ -50,7 +50,8 @@ def read_measured(
     """Read a signal from a table: columns ``time [s]`` or ``crank_angle [deg]``, or both, and signals by their names.
 
     `frequency`: of a revolution of the drive in the scene, Hz; `turns`, `sense`: turns of the crank in it, and -1 where the
-    crank turns clockwise. Raises InputError: the table cannot be read, lacks the signal, or has too few revolutions.
+    crank turns clockwise; `key`: the option, for errors. Raises InputError: the table cannot be read, lacks the signal, or has
+    too few revolutions.
     """
     sheet = read_series(path)
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
@@ -63,16 +64,16 @@ def read_measured(
         place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
     else:
         remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
-        raise InputError("--signal", str(path), "has neither time nor crank angle", remedy)
+        raise InputError(key, str(path), "has neither time nor crank angle", remedy)
     if (np.diff(place) <= 0.0).any():
-        raise InputError("--signal", str(path), "its time or angle does not rise", "Sort its rows")
+        raise InputError(key, str(path), "its time or angle does not rise", "Sort its rows")
     if not np.isfinite(values).all():
-        raise InputError("--signal", str(path), "has cells without a number", "Remove these rows")
+        raise InputError(key, str(path), "has cells without a number", "Remove these rows")
     found = harmonics(place, values, count) if place[-1] - place[0] >= 1.0 else np.empty((0, 1))
     if len(found) < FEWEST:
         reason = f"holds {len(found)} whole revolutions"
         remedy = f"Record {FEWEST} or more: their scatter is its noise"
-        raise InputError("--signal", str(path), reason, remedy)
+        raise InputError(key, str(path), reason, remedy)
     rate = len(place) / float(place[-1] - place[0])
     known = frequency
     if seconds is not None:

@@ -175,7 +175,7 @@ def _aligned(
         # the table says where in a revolution, not in which of the simulated ones
         steps: Array = 2.0 * np.pi * np.arange(float(turns))
         return _best(at, simulated, measured, steps), "by crank angle"
-    if how == "correlation" and any(map(np.ptp, measured)):  # else no shift is better than another
+    if how == "correlation" and any(map(np.ptp, measured)):  # else all shifts are alike
         shifts = np.linspace(0, span, SHIFTS * turns, endpoint=False)
         return _best(at, simulated, measured, shifts, refine=True), "by the largest correlation"
     return 0.0, NOT_ALIGNED
