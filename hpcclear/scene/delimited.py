@@ -215,7 +215,7 @@ def decimal_of(cell: str, comma: bool) -> float:
 
 
 _HEADING = re.compile(
-    r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|(?:\s,|/)\s*(\S.{0,39}))?\s*",
+    r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|\s[/,]\s*(\S.{0,39}))?\s*",
     re.DOTALL,
 )
 NOTHING = ("", "-", "–", "—", "na", "n/a", "nan", "null", "none")
@@ -314,11 +314,11 @@ def parsed_heading(heading: str) -> tuple[str, str]:
     if bracket is not None:
         return name, bracket
     unit = round_ if round_ is not None else rest
-    if heading[len(name) :].startswith("/") and " " in name and is_unit(heading.split(" ")[-1]):
-        return heading, ""  # "speed m/s"
     if unit is not None and (is_unit(unit) or not unit):
         return name, unit
     behind = re.fullmatch(r"(.+?)\s+in\s+(\S.*)", heading)
+    if not behind and not any("/" in word and is_unit(word) for word in heading.split()):
+        behind = re.fullmatch(r"([^/]+)/(\S.*)", heading)  # and "speed m/s" is a name
     if behind and is_unit(behind[2]):
         return behind[1], behind[2]
     attached = re.fullmatch(r"(.+)_([^_]+)", heading)
