@@ -285,21 +285,42 @@ def rough_pose(loops: Loops) -> Array:
     return np.array(np.broadcast_arrays(*found), float)
 
 
+def check_redundant(mechanism: Mechanism) -> None:
+    """Raise InputError if a joint holds, wherever the mechanism stands, what others hold, or they hold it in its clearance."""
+    loops = Loops(uncentred(mechanism), closed=True)
+    anywhere = loops.scales * np.random.default_rng(0).normal(size=loops.size)
+    q = (rough_pose(loops) + anywhere)[:, None]
+    jacobian = loops.at(q, 0.0 * q, np.zeros(1)).jacobian[0]
+    ideal, remedy = ideal_rows(mechanism, loops), "Remove one of them"
+    for owner in ("", *(f"joints.{joint.name}" for joint in mechanism.clearances)):
+        rows = ideal | (np.array(loops.owners) == owner)
+        reason = "cannot move in its clearance" if owner else "is redundant"
+        _check_independent(loops, jacobian, rows, f"{reason} beside {{}}", remedy, owner)
+
+
 def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> None:
     """Raise InputError if constraints depend on one another, of those with Jacobian (rows, n) that `rows` picks."""
-    scaled = (jacobian * loops.scales)[rows]
-    smallest = float(smallest_value(scaled, loops.size))
-    if smallest > SINGULAR:
+    reason = f"constrains nothing at {time:.4g} s beside {{}}. It is a dead centre that the drives cannot pass, or redundant"
+    remedy = "Move the start angles away from it, change a length, or remove the redundant joint"
+    _check_independent(loops, jacobian, rows, reason, remedy)
+
+
+def _check_independent(
+    loops: Loops, jacobian: Array, rows: Booleans, reason: str, remedy: str, owner: str = ""
+) -> None:
+    """Raise InputError if a row depends on others, or all those of an `owner`: of it, or of the last joint among them."""
+    scaled, count = (jacobian * loops.scales)[rows], loops.owners.count(owner) or 1
+    left, values, _ = np.linalg.svd(scaled / _sizes(scaled))
+    values = np.append(values, np.zeros(len(left) - len(values)))
+    if len(values) < count or values[-count] > SINGULAR:
         return
-    share = np.abs(np.linalg.svd(scaled / _sizes(scaled))[0][:, -1])
-    owners = [owner for owner, taken in zip(loops.owners, rows, strict=True) if taken]
-    named = [owner for owner, part in zip(owners, share, strict=True) if part > 0.1 * share.max()]
-    joint = next((owner for owner in reversed(named) if owner.startswith("joints")), named[-1])
-    raise InputError(
-        joint, smallest, f"constrains nothing at {time:.4g} s that other joints do not constrain. It is a dead "
-        "centre that the drives cannot pass, or the joint is redundant",
-        "Move the start angles away from it, change a length, or remove the redundant joint",
-    )  # fmt: skip
+    share = np.abs(left[:, -count:]).max(axis=1)
+    named = dict.fromkeys(np.array(loops.owners)[rows][share > 0.1 * share.max()].tolist())
+    joints = {f"joints.{joint.name}": joint for joint in loops.mechanism.joints}
+    key = owner or next((one for one in reversed(named) if one in joints), [*named][-1])
+    others = [one.partition(".")[2] for one in named if one != key] or ["the other joints"]
+    places = list(places_of(joints[key])) if key in joints else None
+    raise InputError(key, places, reason.format(" and ".join(others)), remedy)
 
 
 def check_ranks(loops: Loops, q: Array, v: Array, times: Array) -> None:

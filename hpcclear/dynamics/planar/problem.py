@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_redundant, placed
 from hpcclear.dynamics.linkage.expression import On
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
@@ -43,6 +43,8 @@ def linkage_of(scene: Scene) -> Linkage:
     shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
     mechanism = mechanism_of(shown.linkage)
     check_drives(mechanism)
+    with errors.at("mechanism"):
+        check_redundant(mechanism)
     cartesian = scene.numerics.formulation == "baumgarte"
     if cartesian:
         check_inertias(mechanism)
