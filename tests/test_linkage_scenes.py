@@ -346,6 +346,15 @@ BROKEN = {
     "drives.motor.turns=0": "from 1",
     "drives.motor.torque=3": "contradicts a prescribed speed",
     "loads.pull.kind=magnet": "known values",
+    'loads.l={kind="spring",first="ground.o",second="ground.p",stiffness=1}': "moves nothing",
+    'loads.l={kind="cylinder",first="rocker.b",second="rocker.b",force=1}': "moves nothing",
+    'loads.l={kind="torsion-spring",body="rocker",other="rocker",stiffness=1}': "moves nothing",
+    'loads.l={kind="force",place="ground.p",force=[1,0]}': "moves nothing",
+    'loads.l={kind="force",place="rocker.b",force=[1,0],direction=1}': "that of a size",
+    'loads.l={kind="force",place="rocker.b",size=1,size_by_time=[[0,1],[1,2]]}': "given twice",
+    'loads.l={kind="drag",body="rocker"}': "no effect. Write linear or quadratic",
+    'loads.l={kind="torsion-spring",body="rocker",angle=1}': "no effect. Write stiffness or damping",
+    'loads.l={kind="torsion-spring",body="rocker",angle=1,damping=1}': "without stiffness",
     "ground.points.p=[0.1]": "pair",
 }
 """Entries that are refused by their own names, and what is said."""
@@ -354,7 +363,7 @@ BROKEN = {
 def refusal(change):
     with pytest.raises(InputError) as caught:
         simulate(rocker(f"mechanism.{change}"))
-    return caught.value.key, f"{caught.value.reason} {caught.value.remedy}"
+    return caught.value.key, f"{caught.value.reason}. {caught.value.remedy}"
 
 
 @pytest.mark.parametrize("change", BROKEN)

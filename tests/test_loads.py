@@ -222,8 +222,8 @@ def test_a_run_up_by_a_table_takes_its_time():
     [
         ({"coil": {"kind": "torsion-spring", "body": "wheel", "stiffness": 1.0}}, "loads.coil.body"),
         ({"coil": {"kind": "torsion-spring", "body": "pendulum", "lower": 0.1}}, "loads.coil.stop_stiffness"),
-        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "other": "nobody"}}, "loads.coil.other"),
-        ({"fan": {"kind": "drag", "body": "ground"}}, "loads.fan.body"),
+        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "other": "nobody", "damping": 1}}, "loads.coil.other"),
+        ({"fan": {"kind": "drag", "body": "ground", "linear": 1}}, "loads.fan.body"),
         ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[1, 2]]}},
          "loads.ram.force"),
         ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[2, 2], [1, 2]]}},

@@ -142,11 +142,11 @@ class Table(BaseModel):
                     error.value = self._held(error.key) if error.value is ... else error.value
                     raise
 
-    def check_one_of(self, remedy: str, key: str, *others: str) -> None:
-        """An error for validators unless an entry is given or one of the others is, and not both."""
-        given, other = (any(getattr(self, k) is not None for k in own) for own in ((key,), others))
-        if given == other:
-            raise invalid("is given twice or not at all", remedy, key)
+    def check_one_of(self, remedy: str, *keys: str) -> None:
+        """An error for validators unless exactly one of some entries is given."""
+        given = [key for key in keys if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise invalid("is given twice or not at all", remedy, (given or keys)[0])
 
     def _held(self, key: str) -> object:
         """A number or text at a dotted key, which may be a default that no file has; `...` for anything else."""

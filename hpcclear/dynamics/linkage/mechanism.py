@@ -27,7 +27,7 @@ class Mechanism:
     loads: tuple[LoadTerms, ...] = ()
 
     def __post_init__(self) -> None:
-        for check in (_names, _places, _numbers, _connected, _drives, _sizes):
+        for check in (_names, _places, _idle, _numbers, _connected, _drives, _sizes):
             check(self)
 
     def body(self, name: str) -> Body:
@@ -175,6 +175,22 @@ def _places(m: Mechanism) -> None:
             reason = "the ground cannot be the sliding body"
             remedy = "Swap point and line"
             raise InputError(f"joints.{joint.name}.point", joint.point, reason, remedy)
+
+
+def _idle(m: Mechanism) -> None:
+    """Loads act between bodies that can move against each other, or on one that can move."""
+    for load in m.loads:
+        for entry, other, kinds in (
+            ("place", "", ("fixed",)), ("second", "first", ("fixed",)), ("other", "body", ("slide", "fixed")),
+        ):  # fmt: skip
+            if (place := getattr(load, entry, None)) is None:
+                continue
+            ends = {parts.split(place)[0], parts.split(getattr(load, other, GROUND))[0]}
+            if any(ends <= group for group in joined(m, kinds)):
+                reason = "a load that acts here moves nothing"
+                raise InputError(
+                    f"loads.{load.name}.{entry}", place, reason, "Name a body that moves"
+                )
 
 
 def coupled(m: Mechanism) -> list[set[str]]:

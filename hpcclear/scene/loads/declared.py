@@ -57,6 +57,15 @@ class Load(Table):
     """Length of its curve over the time, s; 0 where there is none."""
     by_angle: ClassVar[bool] = False
     """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
+    acts_by: ClassVar[tuple[str, ...]] = ()
+    """Entries of which one has to be given, since without any it has no effect."""
+
+    def _check(self) -> None:
+        if self.acts_by and self.model_fields_set.isdisjoint(self.acts_by):
+            remedy = f"Write {' or '.join(self.acts_by)}"
+            raise invalid(
+                "is missing, and without it the load has no effect", remedy, self.acts_by[0], None
+            )
 
     @property
     def straight(self) -> dict[str, tuple[tuple[float, float], ...]]:
@@ -141,8 +150,6 @@ class SizedLoad(Load):
 
     def _check(self) -> None:
         entry, size, timed = self.size_entry, getattr(self, self.size_entry), self.timed
-        if timed is not None and size is not None:
-            raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
         if self.angle_of is not None and not isinstance(size, tuple):
             raise invalid(f"there is no table of {entry} against an angle", "Remove it", "angle_of")
         if not self.repeats:

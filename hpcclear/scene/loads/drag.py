@@ -1,6 +1,6 @@
 """A torque against the rotation of a body, such as that of a fan or of oil that is stirred."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Quantity
@@ -22,6 +22,8 @@ class DragLoad(Load):
     """Torque per angular speed, N m s/rad."""
     quadratic: Annotated[float, Quantity("N*m*s**2/rad**2", least=0)] = 0.0
     """Torque per square of the angular speed, N m s2/rad2, as of a fan."""
+
+    acts_by: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     def act(self, on: Acting) -> Term:
         """The torque."""

@@ -9,7 +9,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Rows
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.curves import Curve, by_angle, by_time
-from hpcclear.scene.fields import Angle, PairTable, Quantity
+from hpcclear.scene.fields import Angle, PairTable, Quantity, invalid
 from hpcclear.scene.loads.declared import SizedLoad
 
 
@@ -45,6 +45,8 @@ class ForceLoad(SizedLoad):
     def _check(self) -> None:
         remedy = "Write force = [x, y], or size and direction"
         self.check_one_of(remedy, "force", "size", "size_by_time")
+        if self.force is not None and self.direction:
+            raise invalid("is that of a size, and [x, y] has its own", remedy, "direction")
 
     def components(self) -> tuple[Array | float, Array | float]:
         """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""

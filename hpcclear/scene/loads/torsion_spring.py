@@ -1,6 +1,6 @@
 """A spring, a damper and end stops on the angle of a body, against the ground or another body."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from hpcclear.base.terms import Acting, Term
 from hpcclear.scene.fields import Angle, Quantity, invalid
@@ -28,7 +28,13 @@ class TorsionSpringLoad(Load):
     stop_stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
     """Stiffness of the stops, N m/rad."""
 
+    acts_by: ClassVar[tuple[str, ...]] = ("stiffness", "damping", "lower", "upper")
+
     def _check(self) -> None:
+        if "angle" in self.model_fields_set and "stiffness" not in self.model_fields_set:
+            raise invalid(
+                "is that of a spring without stiffness", "Give stiffness, or remove it", "angle"
+            )
         stops = self.lower is not None or self.upper is not None
         if stops != (self.stop_stiffness > 0.0):
             remedy = "Give lower or upper, and stop_stiffness above 0"
