@@ -213,6 +213,8 @@ def kinds() -> list[Kind]:
         ("no headings", "g", curve(one, compressed).split(b"\n", 1)[1], compressed),
         ("two turns in a scene of one", "h", curve(two, indicated), "longer than one turn"),
         ("half a turn", "i", curve(one[:37], compressed), "leaves out 180 to 360 deg"),
+        ("half a turn in three rows", "i3", curve(one[:37:18], compressed), "leaves out 180 to 360 deg"),
+        ("pressures below 0", "u", curve(one, lambda a: -compressed(a)), "no absolute pressure is below 0"),
         ("ends that do not meet", "j", curve(np.append(one, 360.0), lambda a: np.asarray(a) / 90.0), "at the same angle"),
         ("four turns", "k", curve(np.arange(0.0, 1440.0), indicated), "more than two turns"),
         ("angles twice", "l", curve(np.repeat(one, 2), compressed), "do not rise"),

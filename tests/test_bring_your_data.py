@@ -213,6 +213,8 @@ def test_a_result_carries_what_files_held(tmp_path):
         ({"bore": "42 mm", "ambient": "1 bar", "column": "p"}, "belongs to measured values"),
         ({"bore": "0 mm", "ambient": "1 bar"}, "bore = '0 mm': must be above 0"),
         ({"file": "p.csv#Run"}, "file = .*p.csv#Run': is text, without sheets"),
+        ({"bore": 42, "ambient": "1 bar"}, "bore = 42: .* at most 5 m"),
+        ({"bore": "42 mm", "ambient": "1 bar", "time": "s"}, "time = 's': has no meaning"),
     ],
 )  # fmt: skip
 def test_curves_that_are_none(row, words, tmp_path):

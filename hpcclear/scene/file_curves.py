@@ -14,7 +14,6 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.plain import counted
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
-from hpcclear.scene import fields
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.faults import explained
 from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, Tables, invalid, table_at
@@ -30,6 +29,8 @@ FINEST = math.radians(0.1)
 """Step to which longer tables are resampled."""
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
 _MOTIONS = {"angle": "rad", "speed": "rad/s"}
+_KINDS = {unit: kind for kind, unit in (_VALUES | _MOTIONS).items()}
+_IN_SI = "no piston is larger, and a number without a unit is in SI"
 
 
 class FileCurve(Table):
@@ -49,9 +50,9 @@ class FileCurve(Table):
     """Unit or heading of forces."""
     torque: str | None = None
     """Unit or heading of torques."""
-    bore: fields.PositiveLength | None = None
+    bore: Annotated[float, Quantity("m", above=0, most=5, why=_IN_SI)] | None = None
     """Diameter of the piston, m."""
-    area: Annotated[float, Quantity("m**2", above=0)] | None = None
+    area: Annotated[float, Quantity("m**2", above=0, most=20, why=_IN_SI)] | None = None
     """Instead of `bore`: area on which the pressure acts, m2."""
     ambient: Annotated[float, Quantity("Pa", least=0)] | None = None
     """Pressure on the other side of the piston, Pa. Required with pressures; 0 if the file contains gauge pressures."""
@@ -117,7 +118,7 @@ def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
 def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
     """The pairs of a curve against the time, s and `unit`, as `pairs_of` does; the motion of a drive begins at 0 s."""
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
-    kind = next(name for name, own in {**_VALUES, **_MOTIONS}.items() if own == unit)
+    kind = _KINDS[unit]
     first, times = _column(sheet, "time", curve.time, "s", key)
     _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
     start = times[0] if kind in _MOTIONS else 0.0
@@ -127,7 +128,7 @@ def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
 
 
 def _kind(curve: FileCurve, unit: str, key: str) -> str:
-    own = next(kind for kind, of in _VALUES.items() if of == unit)
+    own = _KINDS[unit]
     given = next((kind for kind in _VALUES if getattr(curve, kind) is not None), None)
     kind = given or ("pressure" if curve.piston is not None else own)
     if kind not in (own, "pressure") or (kind == "pressure" and own != "force"):
@@ -172,8 +173,8 @@ def _size(unit: str, target: str, key: str) -> Fraction:
 def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key: str) -> Array:
     gauge = plain_unit(column.unit, "Pa") != column.unit
     if gauge and curve.ambient:
-        reason = f"the heading {column.heading!r} is of gauge pressures"
-        raise InputError(f"{key}.ambient", curve.ambient, reason, 'Write ambient = "0 bar"')
+        reason, remedy = f"the heading {column.heading!r} is of gauge pressures", 'Write "0 bar"'
+        raise InputError(f"{key}.ambient", f"{curve.ambient:g} Pa", reason, remedy)
     assert curve.piston is not None  # by validation
     if curve.ambient is None and not gauge:
         reason = "is missing: nothing says whether these are absolute or gauge pressures"
@@ -183,6 +184,9 @@ def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key
     if curve.pushes is not None and not on_slider:
         reason, remedy = "belongs to the load on a slider", "Write direction of this load"
         raise InputError(f"{key}.pushes", curve.pushes, reason, remedy)
+    if curve.ambient and values.min() < 0.0:
+        reason, remedy = "no absolute pressure is below 0", "For gauge pressures set ambient = 0"
+        raise InputError(f"{key}.pressure", _span(values, column), reason, remedy)
     sign = -1.0 if on_slider and curve.pushes != "+x" else 1.0
     found: Array = sign * curve.piston * (values - (curve.ambient or 0.0))
     return found
@@ -211,10 +215,11 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
         remedy = "Give one turn, or the two of a four-stroke engine; average cycles first"
         raise InputError(*where, reason, remedy)
     turns = 1 if span <= TURN * (1 + 1e-6) else 2
-    step = float(np.median(np.diff(angles)))
-    gaps = np.append(np.diff(angles), max(turns * TURN - span, 0.0))
-    worst = int(np.argmax(gaps))
-    if gaps[worst] > LARGEST_GAP and gaps[worst] > 4 * step:
+    steps = np.diff(angles)
+    gaps = np.append(steps, max(turns * TURN - span, 0.0))
+    most = np.append(np.full(len(steps), 4 * np.median(steps)), 1.5 * steps.max())
+    worst = int(np.argmax(excess := gaps - np.maximum(most, LARGEST_GAP)))
+    if excess[worst] > 0.0:
         begin = math.degrees(angles[worst])
         reason = f"leaves out {begin:.6g} to {begin + math.degrees(gaps[worst]):.6g} deg of {360 * turns} deg"
         raise InputError(*where, reason, "Give the whole revolution")
@@ -277,6 +282,11 @@ def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
         raise InputError(f"{key}.file", row["file"], "no file is read here", remedy)
     with at(key), explained(row):
         curve = FileCurve.model_validate(row)
+        known = FileCurve.model_fields.keys() - {"time", "speed"}
+        if pairs.x == "s":
+            known = {"file", "time", _KINDS[pairs.unit]}
+        for entry in row.keys() - known:
+            raise invalid("has no meaning for this curve", "Remove it", entry)
     if pairs.x == "s":
         return against_time(curve, folder, pairs.unit, key)
     return pairs_of(curve, folder, pairs.unit, key, _turns(content))
