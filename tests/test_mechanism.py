@@ -82,7 +82,7 @@ BROKEN = {
         "drives.swing.period",
         "already",
     ),
-    "two periods": (with_more("drives", DEAD), "drives.swing", "does not repeat"),
+    "two periods": (with_more("drives", DEAD), "drives.swing", " s': does not repeat"),
     "no inertia": (
         with_body("rocker", inertia=0.0, center=(0.0, 0.0)),  # that of its pin
         "bodies.rocker.inertia",

@@ -17,6 +17,8 @@ LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 _BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
 
 
+_LONG = re.compile(r"(?=[\d.]{16})\d+\.\d+(?:e[-+]\d+)?")
+"""A number with the digits of a float that was computed: nobody writes as many."""
 _BOXED = re.compile(r"\bnp\.(?:\w+\(([^()]*)\)|(True|False)_)")
 
 
@@ -47,6 +49,8 @@ class InputError(ValueError):
 
     def __str__(self) -> str:
         shown = repr(unboxed(self.value))
+        if not isinstance(self.value, str):
+            shown = _LONG.sub(lambda number: f"{float(number[0]):.4g}", shown)
         # a file's place is of use only whole
         if len(shown) > 80 and os.sep not in shown:
             shown = shown[:77] + "..."

@@ -106,7 +106,8 @@ def _bounds(
     if min(ratios) <= 0:
         reason = "reduces the smallest inertia of the box to 0 or below"
         remedy = f"Narrow it, or raise study.variables.{variable.name}.ratio"
-        raise InputError(f"study.random.{variable.name}", low, reason, remedy)
+        moved = scene.in_unit(low, "kg*m**2")
+        raise InputError(f"study.random.{variable.name}", moved, reason, remedy)
     return min(ratios), max(ratios)
 
 

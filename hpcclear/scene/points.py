@@ -156,16 +156,24 @@ def check_points(scene: Scene, points: Points, label: Label = "sample {}".format
     friction at rest is less than sliding, or a rod is not longer than its crank.
     """
     points = expanded(scene.study, points)
+
+    def refuse(bad: Booleans, values: Array, unit: str, name: str, reason: str) -> None:
+        if bad.any():
+            row = int(np.argmax(bad))
+            value = scene.in_unit(values[row], unit) if unit else float(values[row])
+            remedy = "Narrow its range, or correct that row"
+            raise InputError(f"{label(row)}, {name}", value, reason, remedy)
+
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
         for path in paths:
-            bounds = quantities()[path].bounds()
-            reason = f"must be finite and {bounds}" if bounds else "must be finite"
-            _refuse(~quantities()[path].holds(column), column, name, reason, label)
+            entry = quantities()[path]
+            reason = " and ".join(filter(None, ("must be finite", entry.bounds())))
+            refuse(~entry.holds(column), column, entry.unit, name, reason)
             if path.endswith("initial_speed"):
                 usual = path.replace("initial_speed", "expected_speed")
                 reason = f"starts from rest, and {usual} is not given"
                 if usual not in scene.numeric_paths():
-                    _refuse(column == 0.0, column, name, reason, label)
+                    refuse(column == 0.0, column, entry.unit, name, reason)
     pairs, get = [], Numbers(scene, points)
     if isinstance(scene.mechanism, SliderCrank):
         reason = "the rod no longer than the crank"
@@ -177,7 +185,7 @@ def check_points(scene: Scene, points: Points, label: Label = "sample {}".format
     for small, large, times, reason in pairs:
         word = "" if times == 1.0 else f"{times:g} "
         gap = get(large) - times * get(small)
-        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
+        refuse(gap <= 0, gap, "m", f"{large} - {word}{small}", f"makes {reason}")
     _check_laws(get, points, label)
 
 
@@ -197,13 +205,6 @@ def _check_laws(get: Numbers, points: Points, label: Label) -> None:
                 reason, remedy, name = wrong
                 value = own.get(name, table.value(name))
                 raise InputError(f"{label(row)}, {name}", value, reason, remedy)
-
-
-def _refuse(bad: Booleans, values: Array, name: str, reason: str, label: Label) -> None:
-    if bad.any():
-        row = int(np.argmax(bad))
-        key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
 
 
 def latin_hypercube(

@@ -92,7 +92,7 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
         if own is not None and own.deepest() >= clearance:
             high, given = shown(own.deepest(), "m"), shown(clearance, "m")
             reason = f"waves are {high} high, but the clearance is {given}: the journal may not fit"
-            raise invalid(reason, "Make them smaller", f"out_of_round.{name}", own.deepest())
+            raise invalid(reason, "Make them smaller", f"out_of_round.{name}", high)
 
 
 class WornSurface(Table):

@@ -210,8 +210,8 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> Array:
             return q
         nearest = min(nearest, (float(left[0]), int(worst[0])))
     raise InputError(
-        loops.owners[nearest[1]], nearest[0],
-        "the mechanism cannot be assembled here: the value is the remaining distance of the two sides, in m or rad",
+        loops.owners[nearest[1]], f"{nearest[0]:.4g} {loops.units[nearest[1]]}",
+        "the mechanism cannot be assembled here: its two sides stay so far apart",
         "Check the lengths, or give start_angle of its bodies near the intended assembly",
     )  # fmt: skip
 

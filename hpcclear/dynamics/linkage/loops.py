@@ -71,9 +71,9 @@ class Loops:
     """Constraints of a mechanism's bodies, three coordinates each; `closed`: joints with clearance centred, torque drives at
     their initial speed. `trees`: those of the joints that close loops, in the coordinates of the trees.
 
-    `owners`: which joint or drive each row belongs to, "joints.NAME" or "drives.NAME"; `scales` (n,): what a coordinate's
-    unit step means, a typical length for x, y and along guides, 1 for angles; `row_scales` (rows,): a constraint's unit
-    error, likewise.
+    `owners`: which joint or drive each row belongs to, "joints.NAME" or "drives.NAME"; `units`: of its error; `scales` (n,):
+    what a coordinate's unit step means, a typical length for x, y and along guides, 1 for angles; `row_scales` (rows,): a
+    constraint's unit error, likewise.
     """
 
     def __init__(self, mechanism: Mechanism, closed: bool = False, trees: bool = False) -> None:
@@ -85,7 +85,7 @@ class Loops:
         kinematics = Kinematics(self.forest, writer, Rows(coordinates=0, velocities=n, time=2 * n))
         closing = Closing(kinematics, writer)
         owners: list[str] = []
-        angles: list[bool] = []
+        units: list[str] = []
         texts: list[str] = []
         places: list[tuple[int, int]] = []
         for one in self.forest.closures:
@@ -93,20 +93,20 @@ class Loops:
             for row in closing.rows(one):
                 r = len(owners)
                 owners.append(f"{table}.{one.name}")
-                angles.append(row.name.endswith("_angle"))
+                units.append("rad" if row.name.endswith("_angle") else "m")
                 texts += [f"error[{r}] = {writer.text(row.error)}"]
                 texts += [f"rate[{r}] = {writer.text(row.rate)}"]
                 for column, term in row.columns.items():
                     places.append((r, columns.index(column)))
                     texts.append(f"entries[{len(places) - 1}] = {writer.text(term)}")
-        self.owners = tuple(owners)
+        self.owners, self.units = tuple(owners), tuple(units)
         self._places = tuple(np.array(places, int).reshape(-1, 2).T)
         self._evaluate = of_terms(mechanism, writer, texts, "error, rate, entries")
         self._rows = {name: writer.rows[name] for name in writer.read}
         self.take(values(mechanism, cartesian=not trees))
         self.length = length = float(typical_length(mechanism))
         self.scales = np.array([1.0 if c.kind == "angle" else length for c in columns])
-        self.row_scales = np.where(angles, 1.0, length)
+        self.row_scales = np.where(np.array(units, str) == "rad", 1.0, length)
 
     def take(self, base: Mapping[str, Number]) -> None:
         """Other numbers of the same mechanism, by names as of `numbers.values`: single ones, or arrays of samples (m,)."""

@@ -342,14 +342,15 @@ def _one_period(m: Mechanism) -> None:
         if drive is not main and drive.kind == "table" and drive.advance:
             reason = "goes round by full turns, but another drive defines the period"
             remedy = "End it at the angle where it began, or set period = true here"
-            raise InputError(f"drives.{drive.name}.angle", drive.advance, reason, remedy)
+            gained = f"{drive.advance:.4g} rad"
+            raise InputError(f"drives.{drive.name}.angle", gained, reason, remedy)
         if drive is main or not (drive.prescribed and main.prescribed):
             continue
         times = main.seconds / drive.seconds
         if abs(times - round(times)) > 1e-9 * times or round(times) < 1:
             reason = f"does not repeat within the period of {main.name!r} ({main.seconds:g} s)"
             remedy = "Make the longest one the period, and the others whole fractions of it"
-            raise InputError(f"drives.{drive.name}", drive.seconds, reason, remedy)
+            raise InputError(f"drives.{drive.name}", f"{drive.seconds:.4g} s", reason, remedy)
 
 
 def freedom(m: Mechanism) -> int:

@@ -138,11 +138,11 @@ def _instants_of_bands(scene: Scene) -> int:
     for band in bands:
         if np.floor(band * step * period) < max(np.ceil(band / step * period), 1.0):
             reason = f"contains no multiple of the frequency of the drive, {1.0 / period:.4g} Hz"
-            raise InputError("numerics.levels", band, reason, "Name a higher band")
+            raise InputError("numerics.levels", f"{band:.4g} Hz", reason, "Name a higher band")
     needed = int(np.ceil(spectra.BANDWIDTH * (bands.max(initial=0.0) * step * period + 2.0)))
     if needed > LARGEST_COUNT:
         reason = f"takes {needed} instants a revolution, and there are {LARGEST_COUNT} at most"
-        raise InputError("numerics.levels", bands.max(), reason, "Name a lower band")
+        raise InputError("numerics.levels", f"{bands.max():.4g} Hz", reason, "Name a lower band")
     return max(needed, scene.output.instants_per_revolution, LEAST)
 
 
