@@ -356,6 +356,14 @@ BROKEN = {
     'loads.l={kind="torsion-spring",body="rocker",angle=1}': "no effect. Write stiffness or damping",
     'loads.l={kind="torsion-spring",body="rocker",angle=1,damping=1}': "without stiffness",
     "ground.points.p=[0.1]": "pair",
+    'loads.l={kind="torsion-spring",body="crank",stiffness=1.0}': "l.body: this body goes round",
+    'loads.l={kind="torsion-spring",body="rocker",lower=0.1}': "l.stop_stiffness: stops and",
+    'loads.l={kind="torsion-spring",body="rocker",other="no",damping=1}': "l.other: there is no such",
+    'loads.l={kind="drag",body="ground",linear=1}': "l.body: there is no such",
+    'loads.l={kind="cylinder",first="rocker.b",second="ground.o",force=[[1,2]]}': "l.force: a table of 2",
+    'loads.l={kind="cylinder",first="rocker.b",second="ground.o",force=[[2,2],[1,2]]}': "l.force: the distances",
+    'drives.motor={kind="torque",body="crank",initial_speed=5}': "motor.torque: is given twice",
+    'drives.motor={kind="torque",body="crank",initial_speed=5,torque=1,torque_by_speed=[[0,2],[9,0]]}': "is given twice",
 }
 """Entries that are refused by their own names, and what is said."""
 
@@ -363,7 +371,7 @@ BROKEN = {
 def refusal(change):
     with pytest.raises(InputError) as caught:
         simulate(rocker(f"mechanism.{change}"))
-    return caught.value.key, f"{caught.value.reason}. {caught.value.remedy}"
+    return caught.value.key, f"{caught.value.key}: {caught.value.reason}. {caught.value.remedy}"
 
 
 @pytest.mark.parametrize("change", BROKEN)

@@ -8,7 +8,6 @@ import pytest
 from planar_scenes import planar_scene
 
 from hpcclear import simulate
-from hpcclear.base.errors import InputError
 from hpcclear.scene.joints import PlanarRevolute
 from hpcclear.scene.loads.declared import JointEffect
 
@@ -215,33 +214,3 @@ def test_a_run_up_by_a_table_takes_its_time():
     grown = np.exp(-0.02 * time / 1e-2)
     expected = 100.0 * (1.0 - grown) + 5.0 * grown
     np.testing.assert_allclose(found["crank_speed"].to_numpy(), expected, rtol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("loads", "key"),
-    [
-        ({"coil": {"kind": "torsion-spring", "body": "wheel", "stiffness": 1.0}}, "loads.coil.body"),
-        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "lower": 0.1}}, "loads.coil.stop_stiffness"),
-        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "other": "nobody", "damping": 1}}, "loads.coil.other"),
-        ({"fan": {"kind": "drag", "body": "ground", "linear": 1}}, "loads.fan.body"),
-        ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[1, 2]]}},
-         "loads.ram.force"),
-        ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[2, 2], [1, 2]]}},
-         "loads.ram.force"),
-    ],
-)  # fmt: skip
-def test_loads_at_fault_are_named(loads, key):
-    with pytest.raises(InputError) as told:
-        simulate(machine(loads))
-    assert told.value.key == f"mechanism.{key}"
-
-
-def test_a_motor_has_one_torque():
-    both = {
-        "kind": "torque", "body": "wheel", "initial_speed": 5.0, "torque": 1.0,
-        "torque_by_speed": [[0.0, 2.0], [100.0, 0.0]],
-    }  # fmt: skip
-    for drive in (both, {k: v for k, v in both.items() if "torque" not in k} | {"kind": "torque"}):
-        with pytest.raises(InputError) as told:
-            machine({}, {}, {}, drive)
-        assert told.value.key == "mechanism.drives.clock.torque"

@@ -173,7 +173,7 @@ def test_tables_against_the_time_come_from_files(tmp_path):
 @pytest.mark.parametrize(
     ("load", "key"),
     [
-        ({"torque": 1.0, "torque_by_time": [[0, 1], [1, 2]]}, "loads.x.torque_by_time"),
+        ({"torque": 1.0, "torque_by_time": [[0, 1], [1, 2]]}, "loads.x.torque"),
         ({"torque_by_time": [[0, 1], [1, 2]], "repeats": True}, "loads.x.torque_by_time"),
         ({"torque_by_time": [[-1, 1], [1, 2]]}, "loads.x.torque_by_time"),
         ({"torque": 1.0, "angle_of": "pendulum"}, "loads.x.angle_of"),
