@@ -203,11 +203,11 @@ def test_a_result_carries_what_files_held(tmp_path):
     [
         ({"bore": "42 mm"}, "ambient = None: is missing"),
         ({}, "the unit 'bar' does not fit|the heading"),
-        ({"pressure": "bar"}, "bore = None: is missing"),
+        ({"pressure": "bar"}, "bore = None: is given twice or not at all. A pressure needs"),
         ({"pressure": "bar", "force": "N", "bore": "1 mm"}, "force = 'N': stands beside pressure"),
         ({"torque": "Nm"}, "this entry is a force"),
         ({"bore": "42 mm", "ambient": "1 bar", "pressure": "kPa"}, "has the unit bar"),
-        ({"bore": "42 mm", "ambient": "1 bar", "area": "5 cm2"}, "area = .*stands beside bore"),
+        ({"bore": "42 mm", "ambient": "1 bar", "area": "5 cm2"}, "bore = .*is given twice"),
         ({"bore": "42 mm", "ambient": "1 bar", "pressure": "p2 [bar]"}, "pressure = 'p2': is no column"),
         ({"bore": "42 mm", "ambient": "1 bar", "diameter": 1}, "diameter = 1: is not a known key"),
         ({"bore": "42 mm", "ambient": "1 bar", "column": "p"}, "belongs to measured values"),

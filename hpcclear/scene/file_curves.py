@@ -76,10 +76,8 @@ class FileCurve(Table):
         if given not in ([], ["pressure"]) and piston:
             reason = "belongs to a pressure"
             raise invalid(reason, f"Remove it, or write pressure in place of {given[0]}", piston[0])
-        if self.bore is not None and self.area is not None:
-            raise invalid("stands beside bore", "Keep one of them", "area")
-        if (given == ["pressure"] or piston) and self.bore is None and self.area is None:
-            raise invalid("is missing: pressures need it", 'Add bore = "42 mm", or area', "bore")
+        if given == ["pressure"] or piston:
+            self.check_one_of('A pressure needs bore = "42 mm", or area', "bore", "area")
 
     @property
     def piston(self) -> float | None:

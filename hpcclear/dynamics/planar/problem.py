@@ -42,7 +42,6 @@ def linkage_of(scene: Scene) -> Linkage:
     zeros = [path for path in _may_vary(scene) if scene.number(path) == 0.0]
     shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
     mechanism = mechanism_of(shown.linkage)
-    check_drives(mechanism)
     with errors.at("mechanism"):
         check_redundant(mechanism)
     cartesian = scene.numerics.formulation == "baumgarte"
@@ -102,20 +101,6 @@ def guided(mechanism: Mechanism) -> str:
     slides = (joint for joint in mechanism.joints if joint.kind == "slide")
     held = [split(joint.point)[0] for joint in slides if split(joint.line)[0] == GROUND]
     return next((body.name for body in mechanism.bodies if body.name in held), "")
-
-
-def check_drives(mechanism: Mechanism) -> None:
-    """InputError where the period is a free body's turn and another drive prescribes an angle by time."""
-    main = mechanism.period
-    if main.prescribed:
-        return
-    for drive in mechanism.drives:
-        if drive.prescribed:
-            raise InputError(
-                f"mechanism.drives.{drive.name}.period", False,
-                f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period",
-                "Set period = true here",
-            )  # fmt: skip
 
 
 def check_inertias(m: Mechanism) -> None:
