@@ -205,7 +205,7 @@ def test_a_result_carries_what_files_held(tmp_path):
         ({}, "the unit 'bar' does not fit|the heading"),
         ({"pressure": "bar"}, "bore = None: is given twice or not at all. A pressure needs"),
         ({"pressure": "bar", "force": "N", "bore": "1 mm"}, "force = 'N': stands beside pressure"),
-        ({"torque": "Nm"}, "this entry is a force"),
+        ({"torque": "Nm"}, "torque = 'Nm': has no meaning here, where a force is read"),
         ({"bore": "42 mm", "ambient": "1 bar", "pressure": "kPa"}, "has the unit bar"),
         ({"bore": "42 mm", "ambient": "1 bar", "area": "5 cm2"}, "bore = .*is given twice"),
         ({"bore": "42 mm", "ambient": "1 bar", "pressure": "p2 [bar]"}, "pressure = 'p2': is no column"),

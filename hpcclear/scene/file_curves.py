@@ -30,6 +30,7 @@ FINEST = math.radians(0.1)
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
 _MOTIONS = {"angle": "rad", "speed": "rad/s"}
 _KINDS = {unit: kind for kind, unit in (_VALUES | _MOTIONS).items()}
+_OF_PISTON = ("bore", "area", "ambient", "pushes")
 _IN_SI = "no piston is larger, and a number without a unit is in SI"
 
 
@@ -71,8 +72,7 @@ class FileCurve(Table):
         given = [kind for kind in _VALUES if getattr(self, kind) is not None]
         if len(given) > 1:
             raise invalid(f"stands beside {given[0]}", "Keep one of them", given[1])
-        of_piston = ("bore", "area", "ambient", "pushes")
-        piston = [key for key in of_piston if getattr(self, key) is not None]
+        piston = [key for key in _OF_PISTON if getattr(self, key) is not None]
         if given not in ([], ["pressure"]) and piston:
             reason = "belongs to a pressure"
             raise invalid(reason, f"Remove it, or write pressure in place of {given[0]}", piston[0])
@@ -96,7 +96,7 @@ def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
     Raises InputError if the file is no such curve; it says what was found.
     """
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
-    kind = _kind(curve, unit, key)
+    kind = _KINDS[unit] if curve.pressure is None and curve.piston is None else "pressure"
     first, angles = _column(sheet, "angle", curve.angle, "rad", key)
     second, values = _column(sheet, kind, getattr(curve, kind), _VALUES[kind], key, (first,))
     rows = counted(len(angles), "row")
@@ -123,16 +123,6 @@ def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
     made = np.column_stack([times - start, values]).tolist()
     since = f", {first.heading} since {first.cells[0]}" if sheet.is_clock(first) else ""
     return made, f"{sheet.found}, {counted(len(times), 'row')}{since}"
-
-
-def _kind(curve: FileCurve, unit: str, key: str) -> str:
-    own = _KINDS[unit]
-    given = next((kind for kind in _VALUES if getattr(curve, kind) is not None), None)
-    kind = given or ("pressure" if curve.piston is not None else own)
-    if kind not in (own, "pressure") or (kind == "pressure" and own != "force"):
-        reason = f"this entry is a {own}"
-        raise InputError(f"{key}.{kind}", getattr(curve, kind), reason, f"Write {own} = ...")
-    return kind
 
 
 def _span(values: Array, column: SheetColumn) -> str:
@@ -280,11 +270,11 @@ def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
         raise InputError(f"{key}.file", row["file"], "no file is read here", remedy)
     with at(key), explained(row):
         curve = FileCurve.model_validate(row)
-        known = FileCurve.model_fields.keys() - {"time", "speed"}
-        if pairs.x == "s":
-            known = {"file", "time", _KINDS[pairs.unit]}
+        own = _KINDS[pairs.unit]
+        known = {"file", own} | ({"time"} if pairs.x == "s" else {"angle", "zero", "clockwise"})
+        known |= {"pressure", *_OF_PISTON} if own == "force" and pairs.x == "rad" else set()
         for entry in row.keys() - known:
-            raise invalid("has no meaning for this curve", "Remove it", entry)
+            raise invalid(f"has no meaning here, where a {own} is read", "Remove it", entry)
     if pairs.x == "s":
         return against_time(curve, folder, pairs.unit, key)
     return pairs_of(curve, folder, pairs.unit, key, _turns(content))
