@@ -14,10 +14,10 @@ from test_wear import ROTOR
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.cli.check import describe_scene
 from hpcclear.dynamics.wear.curves import DEEPEST, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import LifePlan, WearOutcome, life
-from hpcclear.ensemble.wear import check_worn
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -178,17 +178,17 @@ def test_a_life_may_go_on_and_one_that_reaches_its_cycles_is_censored():
 
 
 @pytest.mark.parametrize(
-    ("changes", "key"),
+    ("key", "value", "reason"),
     [
-        ({"wear.limit.clearance": "5.1 mm"}, "wear.limit.clearance"),
-        ({"joints.crank_rod.bearing_radius": "1 mm"}, "joints.crank_rod.clearance"),
+        ("wear.limit.clearance", "5.1 mm", "0.25 of "),
+        ("wear.limit.clearance", "0.28 mm", "or more when new"),
+        ("joints.crank_rod.clearance", "6 mm", "0.25 of "),
     ],
 )
-def test_limits_and_clearances_beyond_a_quarter_of_the_radius_are_refused(changes, key):
-    with pytest.raises(InputError) as error:
-        check_worn(load_scene(JOBS / "wear.toml").with_(changes))
+def test_limits_and_clearances_that_end_no_life_or_all_are_refused(key, value, reason):
+    with pytest.raises(InputError, match=reason) as error:
+        describe_scene(load_scene(JOBS / "wear.toml").with_({key: value}), cost=False)
     assert error.value.key == key
-    assert "0.25 of " in error.value.reason
 
 
 # ---- the command -----------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
 
     problem_of(scene)  # refuses what cannot be simulated
     locked = _locked(scene)
-    if scene.study is not None and scene.study.worn:
+    if scene.wear is not None:
         from hpcclear.ensemble.wear import check_worn  # loads the kernel
 
         check_worn(scene)

@@ -76,9 +76,15 @@ def _check_bounds(scene: Scene) -> None:
             reason = f"{reason}, {scene.shown(key, deepest[key])}"
             raise InputError(key, scene.shown(key), reason, "Lower it")
     limit, most = scene.wear.limit.clearance, max(deepest.values())
-    if limit is not None and limit > most:
+    if limit is None:
+        return
+    least = joints_of(scene, inputs_of(scene)).clearance.max(axis=1).min()
+    if limit > most:
         reason = f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, {scene.shown(key, most)}"
         raise InputError("wear.limit.clearance", scene.shown(key, limit), reason, "Lower it")
+    if limit <= least:
+        reason = f"every service life has a clearance of {scene.shown(key, least)} or more when new"
+        raise InputError("wear.limit.clearance", scene.shown(key, limit), reason, "Raise it")
 
 
 def of_lives(scene: Scene) -> Scene:
