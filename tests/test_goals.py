@@ -31,6 +31,8 @@ def test_a_formula_is_arithmetic_of_its_variables() -> None:
     np.testing.assert_allclose(
         value_of(text, {"m2": m2, "m3": m3}), 2 * (m2 + m3) ** 2 / m2 + 5, rtol=1e-15
     )
+    for none in ("1/m2", "m2/m2", "(m2 - 1)**0.5", "(1e99 + m2)**9"):
+        assert np.isnan(value_of(none, {"m2": 0.0}))
 
 
 @pytest.mark.parametrize(
@@ -77,6 +79,10 @@ def test_words_tables_and_units_of_the_objective() -> None:
         ({"constraints": [{"statistic": "percentile", "most": "5 kN"}]}, "constraints.0.statistic", "is a quantile"),
         ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 5}]}, "constraints.0.most", "5: must be above 0 and"),
         ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 0}]}, "constraints.0.most", "it is a probability"),
+        ({"constraints": [{"statistic": "mean", "most": -1}]}, "constraints.0.most", "at least 0 m: no design has less"),
+        ({"constraints": [{"statistic": "deviation", "of": "frame-force-level-at-1Hz", "most": -1}]}, "constraints.0.most", ""),
+        ({"objectives": ["mean", {"statistic": "mean", "of": "mean-gap"}]}, "objectives.1", "'mean': is an objective already"),
+        ({"objectives": ["mean", MASS, {"formula": "m2+m3"}]}, "objectives.2", "'m2+m3': is an objective already"),
         ({"objectives": []}, "objectives", "needs an objective"),
         ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),
@@ -84,6 +90,9 @@ def test_words_tables_and_units_of_the_objective() -> None:
         ({"objectives": ["mean", {"statistic": "mean", "level": 0.5}]}, "objectives.1.level", "belongs to"),
         ({"objectives": ["mean", {"formula": "m2 + C"}]}, "objectives.1.formula", "'C' is no design variable"),
         ({"objectives": ["mean", {"formula": "m2 +"}]}, "objectives.1.formula", "cannot be read"),
+        ({"objectives": ["mean", {"formula": "m2 - m2 + 1"}]}, "objectives.1.formula", "same for all designs"),
+        ({"constraints": [{"formula": "(u2 - 0.11)**0.5", "most": 1}]}, "constraints.0.formula", "no real value"),
+        ({"objectives": ["mean", {"formula": "(1e9*m2)**9**2"}]}, "objectives.1.formula", "a power that"),
         ({"objectives": ["mean", {"statistic": "mean", "formula": "m2"}]}, "objectives.1", "either"),
         ({"constraints": [MASS]}, "constraints.0.most", "missing"),
     ],

@@ -156,13 +156,14 @@ def names_in(text: str) -> tuple[str, ...]:
 
 
 def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
-    """A formula that `names_in` let through, of variables that are numbers or arrays of one shape."""
+    """A formula that `names_in` let through, of variables that are numbers or arrays of one shape; NaN where it has no finite
+    real value."""
     operators = {**_SIGNS, ast.Pow: operator.pow}  # of arrays
 
     def made(node: ast.expr) -> Array | float:
         match node:
             case ast.Name():
-                return variables[node.id]
+                return np.asarray(variables[node.id], dtype=np.float64)
             case ast.Constant(value=float() as number):
                 return number
             case ast.UnaryOp():
@@ -171,8 +172,9 @@ def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
                 return operators[type(node.op)](made(node.left), made(node.right))
         raise FormulaError("was not checked")
 
-    with np.errstate(all="ignore"):  # what comes to no number is seen by who asked
-        return np.asarray(made(_of_variables(text)), dtype=np.float64)
+    with np.errstate(all="ignore"):
+        found = np.asarray(made(_of_variables(text)), dtype=np.float64)
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def number_of(node: ast.expr) -> float | None:

@@ -1,6 +1,7 @@
 """Cases of a study: what is random in an optimisation, which statistics are minimised, and what designs must keep to."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Annotated, Literal, get_args
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydantic import PrivateAttr, WithJsonSchema
 from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import at, nearest
-from hpcclear.base.objectives import ENDS, Objective, Usual
+from hpcclear.base.objectives import ENDS, OURS, Objective, Usual
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import NUMBER, Number, Quantity, Table, hint, invalid
 from hpcclear.scene.named import NAME
@@ -18,6 +19,7 @@ from hpcclear.scene.variables import StudyVariable
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
 Statistic = Literal["mean", "deviation", "quantile", "exceedance", "cost"]
+NO_LESS = "no design has less"
 
 
 class ObjectiveName(PluginName):
@@ -99,12 +101,11 @@ class Goal(Table):
         """Of a quantile: the share that stays below."""
         return 0.95 if self.level is None else self.level
 
-    def same_as(self, other: "Goal") -> bool:
-        """Whether it is the same for every design, as far as its spelling shows."""
-        if self.formula is not None and other.formula is not None:
-            return "".join(self.formula.split()) == "".join(other.formula.split())
-        same = (self.statistic, self.limit, self.of) == (other.statistic, other.limit, other.of)
-        return same and self.formula == other.formula and self.order == other.order
+    def alike(self, objective: str) -> tuple[object, ...]:
+        """What it has in common with those that are the same for every design, as far as their spelling shows; `objective` of
+        the study."""
+        formula = "".join((self.formula or "").split())
+        return self.statistic, self.limit, self.of or objective, formula, self.order
 
     def words(self, unit: str, shown: Callable[[float, str], str] = "{:g} {}".format) -> str:
         """What it is, for people: "95th percentile of f", "probability of f above 0.3 mm" by the `unit` of f; `shown`: how a
@@ -162,23 +163,25 @@ def in_si(case: object, objective: object, key: str) -> object:
         return {"random": case}
     if not isinstance(case, Mapping):
         return case
-    unit = _unit_of(objective, "objective")
+    own = _quantity_of(objective, "objective")
     made = dict(case)
     for table in ("objectives", "constraints"):
         if isinstance(rows := made.get(table), (list, tuple)):
-            made[table] = [_goal(row, unit, f"{key}.{table}.{k}") for k, row in enumerate(rows)]
+            made[table] = [_goal(row, own, f"{key}.{table}.{k}") for k, row in enumerate(rows)]
     return made
 
 
-def _unit_of(response: object, key: str) -> str:
-    """Unit of a response; "" for what cannot be one, as its entry says; an error for validators where it is not known."""
+def _quantity_of(response: object, key: str) -> Quantity:
+    """What values of a response are; plain numbers of what cannot be one, as its entry says; an error for validators where it
+    is not known."""
     if not isinstance(response, str):
-        return ""
+        return Quantity()
     with as_invalid(key):
-        return getattr(OBJECTIVES.get(response), "unit", "")
+        unit = getattr(OBJECTIVES.get(response), "unit", "")
+    return Quantity(unit, least=0.0, why=NO_LESS) if response in OURS else Quantity(unit)
 
 
-def _goal(row: object, unit: str, key: str) -> object:
+def _goal(row: object, own: Quantity, key: str) -> object:
     made = {"statistic": row} if isinstance(row, str) else row
     if not isinstance(made, Mapping):
         return row
@@ -187,11 +190,13 @@ def _goal(row: object, unit: str, key: str) -> object:
         remedy = hint(word) + nearest(word, known)
         raise invalid("is not one of the known values", remedy, f"{key}.statistic", word)
     if isinstance(made.get("of"), str):
-        unit = _unit_of(made["of"], f"{key}.of")
-    most = Quantity(unit if word in ("mean", "deviation", "quantile") else "")
+        own = _quantity_of(made["of"], f"{key}.of")
+    most = own if word in ("mean", "quantile") else Quantity()
+    if word == "deviation":
+        most = replace(own, least=0.0, why=NO_LESS)
     if word == "exceedance":
         most = Quantity("", above=0, below=1, why="it is a probability")
-    for name, its in (("limit", Quantity(unit)), ("most", most)):
+    for name, its in (("limit", own), ("most", most)):
         if name in made:
             made[name] = its.convert(made[name], f"{key}.{name}")
     return made
@@ -223,11 +228,6 @@ class Case(Table):
         if len(rows) > len(ENDS):
             reason = f"with more than {len(ENDS)} objectives nearly every design is on the front"
             raise invalid(reason, "Use constraints, or combine some in one formula", "objectives")
-        for k, goal in enumerate(rows):
-            if any(goal.same_as(other) for other in rows[:k]):
-                reason = "is an objective already"
-                remedy = "Remove it, or name another objective"
-                raise invalid(reason, remedy, f"objectives.{k}", goal.formula or goal.statistic)
 
     @property
     def goals(self) -> tuple[Goal, ...]:
@@ -243,6 +243,12 @@ class Case(Table):
     def kept(self) -> tuple[Constraint, ...]:
         """What designs must keep to."""
         return self.constraints or ()
+
+    @property
+    def rows(self) -> dict[str, Goal]:
+        """Objectives, then constraints, by their keys: "objectives.0"."""
+        tables = {"objectives": self.goals, "constraints": self.kept}
+        return {f"{name}.{k}": one for name, rows in tables.items() for k, one in enumerate(rows)}
 
     @property
     def plain(self) -> bool:

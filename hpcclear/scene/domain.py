@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.fields import invalid
 from hpcclear.scene.named import Range
 from hpcclear.scene.planar import slender_inertia
 from hpcclear.scene.study import Study
@@ -20,6 +21,8 @@ from hpcclear.scene.variables import StudyVariable
 
 ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
+FORMULAS, DEFINED = 512, 0.25
+"""Designs at which formulas are tried, and share of them at which each must have a value."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,24 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
     lower, upper = (np.array(side, dtype=np.float64) for side in zip(*bounds, strict=True))
     lower.flags.writeable = upper.flags.writeable = False
     return Box(chosen, lower, upper)
+
+
+def check_formulas(scene: SceneTables) -> None:
+    """An error for validators where a formula of a case has a value at few designs of its box, or the same at all."""
+    for case in scene.required_study.cases:
+        names = scene.required_study.design_variables(case.name)
+        unit = np.random.default_rng(0).random((FORMULAS, len(names)))
+        columns = to_physical(scene, names, box(scene, names).at(unit)).T
+        for place, goal in case.rows.items():
+            if goal.formula is None:
+                continue
+            key = f"study.cases.{case.name}.{place}.formula"
+            values = goal.of_design(dict(zip(names, columns, strict=True)))
+            if np.isfinite(values).mean() < DEFINED:
+                reason = "has no real value at three of four designs"
+                raise invalid(reason, "Narrow the ranges of its variables, or rewrite it", key)
+            if np.nanmin(values) == np.nanmax(values):
+                raise invalid("is the same for all designs", "Remove it, or rewrite it", key)
 
 
 def shares(scene: SceneTables, design: Mapping[str, float]) -> Array:

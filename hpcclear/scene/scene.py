@@ -296,6 +296,7 @@ def _check_study(scene: SceneTables, study: Study) -> None:
         if variable.rows:
             scene.baseline(variable.name)
     domain.box(scene, widen=tuple(row.name for row in study.random))
+    domain.check_formulas(scene)
 
 
 def _check_worn_inputs(scene: SceneTables, study: Study) -> None:

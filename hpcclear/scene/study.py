@@ -132,26 +132,32 @@ class Study(StudyTables):
             count = len(case.goals)
             reason = f"case {case.name} has {count} objectives, each with a best design of its own"
             raise invalid(reason, f"Request {count} solutions or more", "swarm.archive")
-        for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
-            for k, goal in enumerate(rows):
-                key = f"cases.{case.name}.{table}.{k}"
-                for name in () if goal.formula is None else names_in(goal.formula):
-                    with at(f"{key}.formula", goal.formula):
-                        check_known(name, own, "is no design variable of this case")
-                        if self.variable(name).rows:
-                            remedy = 'Give its rows a cost, and write statistic = "cost"'
-                            raise invalid(f"{name!r} is a row of a table and no number", remedy)
-                if goal.of is not None and goal.of != self.objective:
-                    if why := self._not_recorded(goal.of):
-                        remedy = f"Make it study.objective, and name {self.objective!r} in `of` in its place"
-                        raise invalid(why, remedy, f"{key}.of", goal.of)
-                    goal.placed(2 + self.further.index(goal.of))
-                if goal.statistic == "cost":
-                    priced = tuple(one for one in self.variables if one.name in own and one.priced)
-                    if not priced:
-                        remedy = 'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one'
-                        raise invalid("no design variable has a cost", remedy, f"{key}.statistic")
-                    goal.priced_by(priced)
+        met = list[object]()
+        for place, goal in case.rows.items():
+            key = f"cases.{case.name}.{place}"
+            if place.startswith("objectives") and goal.alike(self.objective) in met:
+                said = "is an objective already", "Remove it, or name another objective"
+                raise invalid(*said, key, goal.formula or goal.statistic)
+            met.append(goal.alike(self.objective))
+            for name in () if goal.formula is None else names_in(goal.formula):
+                with at(f"{key}.formula", goal.formula):
+                    check_known(name, own, "is no design variable of this case")
+                    if self.variable(name).rows:
+                        remedy = 'Give its rows a cost, and write statistic = "cost"'
+                        raise invalid(f"{name!r} is a row of a table and no number", remedy)
+            if goal.of is not None and goal.of != self.objective:
+                if why := self._not_recorded(goal.of):
+                    remedy = (
+                        f"Make it study.objective, and name {self.objective!r} here in its place"
+                    )
+                    raise invalid(why, remedy, f"{key}.of", goal.of)
+                goal.placed(2 + self.further.index(goal.of))
+            if goal.statistic == "cost":
+                priced = tuple(one for one in self.variables if one.name in own and one.priced)
+                if not priced:
+                    remedy = 'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one'
+                    raise invalid("no design variable has a cost", remedy, f"{key}.statistic")
+                goal.priced_by(priced)
 
     @staticmethod
     def _not_recorded(name: str) -> str:
