@@ -200,6 +200,8 @@ REFUSED = {
     "law without scale": ({"m3": {"range": [0.1, 0.2], "cost": {"law": "exponential", "at": 0.1, "cost": 1}}}, {}, "needs it"),
     "grade": ({"fit": {"fits": FITS, "path": "joints.crank_rod.fit", "cost": {"IT7": 1}}}, {}, "no cost of IT6"),
     "one load": ({"m3": M3, "n": {"range": [1, 2], "over": "worst", "path": "drive.speed"}}, {}, "values or rows"),
+    "word": ({"m3": M3, "n": {"values": [1, 2], "over": "wurst", "path": "drive.speed"}}, {}, 'Write over = "worst"'),
+    "weight": ({"m3": M3, "n": {"values": [1, 2], "over": [1, -1], "path": "drive.speed"}}, {}, "must be at least 0"),
     "weights": ({"m3": M3, "n": {"values": [1, 2], "over": [1], "path": "drive.speed"}}, {}, "as many weights"),
 }  # fmt: skip
 

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import nearest
+from hpcclear.base.errors import at, nearest
 from hpcclear.scene.fields import Entries, Number, Quantity, Table, check_known, invalid
 from hpcclear.scene.fits import fit_of
 from hpcclear.scene.paths import flatten, quantities
@@ -58,7 +58,8 @@ class CatalogueRow(Table):
             if path not in quantities():
                 remedy = nearest(path, tuple(quantities()))
                 raise invalid("is not a physical number of a scene", remedy, path, value)
-            entries[path] = quantities()[path].convert(value, path)
+            with at("", value):
+                entries[path] = quantities()[path].convert(value, path)
         if not entries:
             raise invalid("has no entry", 'Write "joints.crank_rod.clearance" = "20 um", say')
         return {**kept, "entries": entries}

@@ -148,6 +148,8 @@ def _explained(error: ErrorDetails, found: object, path: str) -> tuple[str, str]
             table = path.removesuffix(".kind").removeprefix("mechanism.")
             kinds = _KINDS.get(table) or _KINDS[table.partition(".")[0]]
             return "is missing", f"Add kind = {kinds}"
+        case "model_attributes_type":
+            return "a table is expected here", "Write it as [table] or { key = value }"
         case "bool_type":
             return "true or false is expected here", "Write true or false"
         case "string_type":

@@ -25,7 +25,7 @@ from hpcclear.scene.fields import Content, Tables, invalid, nearest
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import PHYSICAL, files_named, flatten, of_kinds, replace
 from hpcclear.scene.plugged import check_trust, texts_of, with_texts
-from hpcclear.scene.study import Study
+from hpcclear.scene.study import Study, with_open_parameter
 from hpcclear.scene.syntax import DEEPEST, file_text, parse
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.variables import StudyVariable
@@ -204,7 +204,7 @@ class Scene(ConsistentTables):
         InputError
             As `load_scene`.
         """
-        content = self.resolved()
+        content = with_open_parameter(self.resolved())
         altered = {path: unboxed(one) for path, one in {**(changes or {}), **more}.items()}
         for path, value in altered.items():
             if not dotted(path):
@@ -316,6 +316,9 @@ def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
             raise invalid(reason, "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles)
 
 
+Corner = tuple[str, dict[str, float], str]  # key of what reaches it, entries, these in words
+
+
 def _check_corners(scene: SceneTables, study: Study) -> None:
     """Each bound of each variable, widened by what is random about it, must still make a mechanism."""
     names = (*PHYSICAL, "numerics", "plugins")
@@ -328,23 +331,38 @@ def _check_corners(scene: SceneTables, study: Study) -> None:
             centre = 0.0 if row.absolute else scene.number(row.paths[0])
             reach[row.name] = study.reach(row)
             spans[row.name] = ("random", row.paths, (centre, centre))
+    corners = list[Corner]()
     for name, (table, paths, (lower, upper)) in spans.items():
-        corners = [(table, lower), (table, upper)] if table == "variables" else []
+        ends = [(table, lower), (table, upper)] if table == "variables" else []
         if name in reach:
             low, high = reach[name]
-            corners += [("random", lower + low), ("random", upper + high)]
-        for key, value in corners:
-            entries, words = dict.fromkeys(paths, value), scene.shown(paths[0], value)
-            _check_corner(scene, content, entries, f"study.{key}.{name}", f"{name} = {words}")
+            ends += [("random", lower + low), ("random", upper + high)]
+        for key, value in ends:
+            words = f"{name} = {scene.shown(paths[0], value)}"
+            corners.append((f"study.{key}.{name}", dict.fromkeys(paths, value), words))
     for variable in study.variables:
         for option in variable.rows:
             entries = {path: float(option.entries[path]) for path in variable.entry_paths}
-            key = f"study.variables.{variable.name}"
-            _check_corner(scene, content, entries, key, f"{variable.name} = {option.name!r}")
+            words = f"{variable.name} = {option.name!r}"
+            corners.append((f"study.variables.{variable.name}", entries, words))
+    for corner in (*corners, *_compared(scene, study, corners)):
+        _check_corner(scene, content, *corner)
+
+
+def _compared(scene: SceneTables, study: Study, corners: Sequence[Corner]) -> Iterator[Corner]:
+    """The scene and the corners of its variables with the clearance of the compared responses."""
+    key, own = "study.verification.response_clearance", study.verification.response_clearance
+    paths = [f"{scene.joint_key(name)}.clearance" for name in scene.clearance_joints()]
+    if own is not None and paths:
+        entries, words = dict.fromkeys(paths, own), scene.shown(paths[0], own)
+        yield key, entries, words
+        for of, its, at in corners:
+            if of.startswith("study.variables."):
+                yield key, its | entries, f"{words} with {at}"
 
 
 def _check_corner(
-    scene: SceneTables, content: Tables, entries: Mapping[str, float], key: str, words: str
+    scene: SceneTables, content: Tables, key: str, entries: Mapping[str, float], words: str
 ) -> None:
     """An error for validators unless the scene is one with other entries."""
     for path, value in entries.items():
@@ -355,7 +373,7 @@ def _check_corner(
         said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
         reason = getattr(said, "reason", "it is not valid")
         reason = f"reaches {words}, which makes no mechanism: {reason}"
-        raise invalid(reason, "Narrow it", key) from None
+        raise invalid(reason, "Change it" if "verification" in key else "Narrow it", key) from None
 
 
 def _unpickled(content: Content, text: str, readings: tuple[Reading, ...], texts: Texts) -> Scene:

@@ -7,8 +7,9 @@ from hpcclear.base.arithmetic import names_in
 from hpcclear.base.errors import at
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.cases import Case, in_si
-from hpcclear.scene.fields import Entries, check_known, invalid
+from hpcclear.scene.fields import Content, Entries, check_known, invalid
 from hpcclear.scene.named import paths_of, texts_in
+from hpcclear.scene.paths import replace
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import Sensitivity, of_both
 from hpcclear.scene.study_tables import StudyTables, claim
@@ -208,12 +209,13 @@ class Study(StudyTables):
 
     def _check_groups(self) -> None:
         """The fixed parameter of response surfaces."""
+        parameter = self.sensitivity.parameter
+        if parameter is not None:
+            check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
         if self.sensitivity.groups:
-            parameter = self.sensitivity.parameter
             if parameter is None:
                 reason = "not one variable drives clearances, so the fixed parameter is not known"
                 raise invalid(reason, f"Name one: {', '.join(self.names)}", "sensitivity.parameter")
-            check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
             if any(parameter in group for group in self.sensitivity.groups):
                 reason = "the parameter is fixed, so it cannot be an input of a surface"
                 raise invalid(reason, "Remove it from the group", "sensitivity.groups")
@@ -264,6 +266,14 @@ def _only_clearance(variables: Mapping[str, object]) -> str | None:
         if "range" in own and {p.endswith(".clearance") for p in paths_of(name, own)} == {True}:
             found.append(name)
     return found[0] if len(found) == 1 else None
+
+
+def with_open_parameter(content: Content) -> Content:
+    """A scene's tables without the parameter of the sensitivity where that is the one that follows from the variables."""
+    study = content.get("study", {})
+    own = study.get("sensitivity", {}).get("parameter")
+    follows = own is not None and own == _only_clearance(study["variables"])
+    return replace(content, "study.sensitivity.parameter", None) if follows else content
 
 
 def _enough(stage: Sensitivity, inputs: int, order: int, samples: int, entry: str) -> None:

@@ -17,6 +17,8 @@ from hpcclear.scene.paths import described, quantities
 
 LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 """Entries that scale with m L^2/12."""
+WEIGHT = Quantity("", least=0)
+"""Of a load case."""
 
 
 class StudyVariable(NamedInput):
@@ -41,7 +43,7 @@ class StudyVariable(NamedInput):
     "random.C12.half_width". Written as `path` or `paths`."""
     like: str | None = None
     """Entry that determines its unit if it sets random inputs. The study determines it."""
-    over: Literal["worst"] | tuple[Annotated[float, Quantity("", least=0)], ...] | None = None
+    over: Literal["worst"] | tuple[Annotated[float, WEIGHT], ...] | None = None
     """For load cases: each design is simulated at all values or rows of this variable. f is the largest result
     ("worst"), or the mean with these weights, one for each row."""
     cost: Cost | None = None
@@ -99,7 +101,11 @@ class StudyVariable(NamedInput):
                 "a variable needs a range or values, fits, a catalogue or, for an inertia, a ratio",
                 "Add range = [lower, upper]" if not kinds else f"Keep one of {', '.join(kinds)}",
             )
-        kind = kinds[0]
+        kind, over = kinds[0], row.get("over")
+        if isinstance(over, list | tuple):
+            row["over"] = [WEIGHT.convert(one, f"over.{k}") for k, one in enumerate(over)]
+        elif over not in (None, "worst"):
+            raise invalid("is no list of weights", 'Write over = "worst", or weights', "over")
         if "step" in row and kind != "range":
             raise invalid("belongs to a range", "Remove it, or give a range", "step")
         if kind in ("fits", "catalogue"):
