@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcclear.base.arithmetic import names_in
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import invalid
@@ -21,8 +22,8 @@ from hpcclear.scene.variables import StudyVariable
 
 ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
-FORMULAS, DEFINED = 512, 0.25
-"""Designs at which formulas are tried, and share of them at which each must have a value."""
+FORMULAS = 512
+"""Designs at which formulas are tried; of each variable a quarter sits on either bound."""
 
 
 @dataclass(frozen=True)
@@ -64,20 +65,24 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
 
 
 def check_formulas(scene: SceneTables) -> None:
-    """An error for validators where a formula of a case has a value at few designs of its box, or the same at all."""
+    """An error for validators where a formula of a case has no value at a design of its box, or the same at all."""
     for case in scene.required_study.cases:
         names = scene.required_study.design_variables(case.name)
-        unit = np.random.default_rng(0).random((FORMULAS, len(names)))
+        unit = np.clip(
+            np.random.default_rng(0).uniform(-0.5, 1.5, (FORMULAS, len(names))), 0.0, 1.0
+        )
         columns = to_physical(scene, names, box(scene, names).at(unit)).T
         for place, goal in case.rows.items():
             if goal.formula is None:
                 continue
             key = f"study.cases.{case.name}.{place}.formula"
-            values = goal.of_design(dict(zip(names, columns, strict=True)))
-            if np.isfinite(values).mean() < DEFINED:
-                reason = "has no real value at three of four designs"
+            designs = dict(zip(names, columns, strict=True))
+            values = goal.of_design(designs)
+            if not (found := np.isfinite(values)).all():
+                where = (f"{n} = {designs[n][found.argmin()]:.4g}" for n in names_in(goal.formula))
+                reason = f"has no real value where {', '.join(where)}"
                 raise invalid(reason, "Narrow the ranges of its variables, or rewrite it", key)
-            if np.nanmin(values) == np.nanmax(values):
+            if values.min() == values.max():
                 raise invalid("is the same for all designs", "Remove it, or rewrite it", key)
 
 

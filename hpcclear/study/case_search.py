@@ -66,15 +66,14 @@ class CaseSearch:
         self._names = run.study.design_variables(case.name)
         self._region, self._rng = box(run.scene, self._names), run.rng("search", case.name)
         guesses = Guesses(run, case, models, self._size)
-        directions, exact = contest.directions(case), goals.exact_in(run.scene, case)
+        directions = contest.directions(case)
         self._space = Space(
             self._region.bounds,
             directions,
-            exact[: len(case.goals)],
+            goals.exact_in(run.scene, case),
             self._margins(AIM),
             partial(snapped, run.study, self._names),
             guesses.trends(self._region, self._rng),
-            [one for one in exact if one],
         )
         others = [*range(1, len(directions)), None] if len(case.goals) > 1 else []
         turns = [part for one in others for part in (0, one)] or [0]

@@ -111,14 +111,14 @@ def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
 
 
 def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
-    """Of each objective and constraint of a case, sampling coordinates (n, d) to its values (n,) if it is exact, else None."""
+    """Of each that a case makes small, sampling coordinates (n, d) to its values (n,) if it is exact, else None."""
     names = scene.required_study.design_variables(case.name)
 
     def exact(goal: Goal, points: Array) -> Array:
         designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
         return np.array(np.broadcast_to(goal.of_design(designs), len(points)))
 
-    return [partial(exact, goal) if goal.exact else None for goal in (*case.goals, *case.kept)]
+    return [partial(exact, goal) if goal.exact else None for goal in case.goals]
 
 
 def ends_in_all(study: Study) -> int:

@@ -9,7 +9,6 @@ import moocore
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
 from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
@@ -97,12 +96,6 @@ def _search(run: StudyRun, problem: SwarmProblem, rng: np.random.Generator) -> F
     if len(front.values):
         return front
     near = minimised(broken, 1)  # no design keeps the constraints: the nearest
-    if not len(near.values):
-        key, reason = (
-            f"study.cases.{problem.case.name}",
-            "its formulas have a value at no design met",
-        )
-        raise InputError(key, "...", reason, "Raise study.swarm.particles, or narrow the ranges")
     return replace(near, values=np.asarray(function(near.points)[0]))
 
 

@@ -56,25 +56,23 @@ class SwarmProblem:
         return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """Objectives of designs in SI, (n, objectives), NaN where a formula has no value; with others than mean and standard
-        deviation, also by how much constraints are violated, (n,)."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
         draws = self.draws(designs)
         each = [one.sampled(designs, draws) for one in (self.objective, *self.further)]
-        named = dict(zip(self.names, designs.T, strict=True))
+        named, broken = dict(zip(self.names, designs.T, strict=True)), []
 
         def of(goal: Goal) -> Array:
             return each[max(goal.place - 1, 0)]
 
         found = np.column_stack([guessed(goal, of(goal), named) for goal in self.case.goals])
-        broken = [np.where(np.isfinite(found).all(axis=1), 0.0, np.nan)]
         for one in self.case.kept:
             if one.statistic == "exceedance":
                 broken.append(shortfall(one, one.most, of(one)))
             else:
                 broken.append(excess([one], guessed(one, of(one), named)[:, None]))
-        return found, np.max(broken, axis=0)
+        return (found, np.maximum(np.max(broken, axis=0), 0.0)) if broken else found
 
     def moments(self, designs: Array) -> Array:
         """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""

@@ -80,7 +80,7 @@ def of_interval(
     `taken` is the part of the half-width that more simulations leave."""
     if one.upper <= goal.most:
         return Decision(Verdict.HOLDS, np.nan)
-    if one.lower > goal.most or (goal.exact and np.isnan(one.value)):
+    if one.lower > goal.most:
         return Decision(Verdict.FAILS, np.nan)
     gap = abs(goal.most - one.value)
     if taken >= gap > 0.0:

@@ -156,7 +156,6 @@ def _name_case(
     ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count
     front = mine.front(run.study.verification.designs + count) if known else []
     merit = values[:, 0] + SPAN * values[:, 1] if case.plain else values[:, 0]
-    merit = np.where(everything.known, merit, np.inf)
     recommended = min(ours, key=lambda k: float(merit[k])) if known else ends[0]
     between = {*(ours[k] for k in front), recommended} - {*ends}
     inner = sorted(between, key=lambda k: float(values[k, 0]))
@@ -182,7 +181,6 @@ def _nearest(rows: Sequence[int], verdicts: Sequence[Verdict], broken: Array) ->
     the nearest one. `verdicts`, `broken`: on all constraints, and the excess, of all designs, (n,)."""
     found, have = best([verdicts[k] for k in rows])
     level = [k for k, has in zip(rows, have, strict=True) if has]
-    broken = np.nan_to_num(broken, nan=np.inf)
     if found is Verdict.HOLDS:
         return level
     within = [k for k in level if broken[k] <= 0.0]

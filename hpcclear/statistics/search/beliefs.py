@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
-from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kernels import MATERN, Errors
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -75,12 +75,6 @@ class Space:
     """The nearest designs that there are, (n, d): values from a catalogue, say."""
     trends: Sequence[OfDesigns] = ()
     """What a cheaper model says of objectives, then of constraints, (n,) each; empty without one."""
-    formulas: Sequence[OfDesigns] = ()
-    """What has no value at designs that are no answer, (n,) each, NaN there."""
-
-    def there(self, designs: Array) -> Booleans:
-        """Which designs (n, d) have a value of each formula."""
-        return np.all([np.isfinite(one(designs)) for one in self.formulas], axis=0)
 
     def apart(self, designs: Array, one: Array) -> Array:
         """How far designs (n, d) are from one (d,), over the ranges, (n,): the largest of all coordinates."""

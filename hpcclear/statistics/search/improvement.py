@@ -91,7 +91,7 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     """At most so many new designs, (k, d), each the best by one draw of what is believed of all together (Thompson sampling),
     and what the design that is believed to be the best is expected to lose to the best of all; 0 where none is new."""
     points = np.vstack([beliefs.known.designs[beliefs.allowed], _candidates(beliefs)])
-    points = points[beliefs.space.there(points) & (beliefs.feasible(points) >= LIKELY)]
+    points = points[beliefs.feasible(points) >= LIKELY]
     mean, variance = beliefs.means(points) @ direction, beliefs.variances(points) @ direction**2
     least = mean - UNSEEN * np.sqrt(variance)
     least[mean <= mean.min(initial=np.inf)] = -np.inf  # the best is drawn first: losses are its own
@@ -218,9 +218,9 @@ def _scalarised(front: Array, drawn: Array, weights: Array) -> Array:
 def _best(beliefs: Beliefs, merit: Merit) -> tuple[Array, float]:
     """The candidate of most merit, (d,), moved by smaller and smaller steps while that helps; and its merit."""
     space, rng = beliefs.space, beliefs.rng
-    place, worth = _most(space, _candidates(beliefs), merit)
+    place, worth = _most(_candidates(beliefs), merit)
     for step in STEPS:
-        other, its = _most(space, space.snap(_about(place, step, space, rng)), merit)
+        other, its = _most(space.snap(_about(place, step, space, rng)), merit)
         if its > worth:
             place, worth = other, its
     return place, worth
@@ -236,8 +236,8 @@ def _candidates(beliefs: Beliefs) -> Array:
     return np.asarray(space.snap(np.concatenate(points)))
 
 
-def _most(space: Space, points: Array, merit: Merit) -> tuple[Array, float]:
-    worth = np.where(space.there(points), merit(points), -np.inf)
+def _most(points: Array, merit: Merit) -> tuple[Array, float]:
+    worth = merit(points)
     row = int(worth.argmax())
     return points[row], float(worth[row])
 
