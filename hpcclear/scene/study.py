@@ -230,8 +230,8 @@ class Study(StudyTables):
             _enough(stage, together, order, samples, "together_samples")
         if self.cases:
             inputs = max(len(model) for model in self.models)
-            if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
-                reason = f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit"
+            if self.surrogate.model in (None, "kriging") and self.samples < inputs + 3:
+                reason = f"a Kriging model in {inputs} inputs needs {inputs + 3} samples at least"
                 raise invalid(reason, f"Request at least {10 * inputs} samples", "samples")
 
 

@@ -91,6 +91,8 @@ class SensitivityEvidence:
 
 def _grows_with_clearance(found: SensitivityEvidence) -> Finding:
     mean, error = found.result["mean_objective"], found.result["mean_objective_error"]
+    if len(mean) < 2:
+        return OPEN, "the study has one clearance"
     step = np.diff(mean)
     allowed = SURE * np.hypot(error[1:], error[:-1])
     least = f"{step.min():.2g}, significant above {allowed[step.argmin()]:.2g}"
