@@ -38,12 +38,6 @@ def forged(path: Path, scene: str) -> Path:
     return path
 
 
-def naming(path: Path) -> str:
-    """A scene whose random clearance has its values in a file."""
-    content = QUICKSTART.read_text().partition("[study.random]")[0]
-    return f'{content}\n[study.random]\nC = {{ distribution = "samples", file = "{path}" }}\n'
-
-
 @pytest.fixture
 def secret(tmp_path) -> Path:
     path = tmp_path / "passwd"
@@ -57,7 +51,9 @@ def secret(tmp_path) -> Path:
 def test_no_file_that_the_scene_of_a_result_names_is_opened(tmp_path, secret, monkeypatch):
     place = tmp_path / "results"
     place.mkdir()
-    for name, text in (("a", naming(secret)), ("c", "no scene"), ("d", "")):
+    content = QUICKSTART.read_text().partition("[study.random]")[0]
+    naming = f'{content}\n[study.random]\nC = {{ distribution = "samples", file = "{secret}" }}\n'
+    for name, text in (("a", naming), ("c", "no scene"), ("d", "")):
         forged(place / f"{name}.nc", text)
     (place / "e.nc").write_bytes((place / "a.nc").read_bytes()[:-500])
     opened: list[str] = []

@@ -368,17 +368,13 @@ BROKEN = {
 """Entries that are refused by their own names, and what is said."""
 
 
-def refusal(change):
-    with pytest.raises(InputError) as caught:
-        simulate(rocker(f"mechanism.{change}"))
-    return caught.value.key, f"{caught.value.key}: {caught.value.reason}. {caught.value.remedy}"
-
-
 @pytest.mark.parametrize("change", BROKEN)
 def test_broken_linkages_are_refused_by_name(change):
-    key, words = refusal(change)
-    assert key.startswith(f"mechanism.{change.partition('=')[0]}")
-    assert BROKEN[change] in words
+    with pytest.raises(InputError) as caught:
+        simulate(rocker(f"mechanism.{change}"))
+    said = caught.value
+    assert said.key.startswith(f"mechanism.{change.partition('=')[0]}")
+    assert BROKEN[change] in f"{said.key}: {said.reason}. {said.remedy}"
 
 
 def test_a_slider_crank_s_tables_do_not_fit_a_linkage():

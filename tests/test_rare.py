@@ -59,10 +59,6 @@ def plane(u):
     return u.sum(axis=1) / u.shape[1] ** 0.5
 
 
-def two_sides(u):
-    return np.maximum(u[:, 0], -u[:, 1])
-
-
 def rough(u):
     """A plane with waves that are far too short to be seen: of a sine of a normal phase that is uniform."""
     return plane(u) + 0.3 * np.sin(400.0 * (u[:, 0] - u[:, 1]))
@@ -75,7 +71,11 @@ def waves(limit: float) -> float:
 
 CASES = {
     "plane": (plane, 4, lambda limit: stats.norm.sf(limit)),
-    "two sides": (two_sides, 3, lambda limit: 1.0 - stats.norm.cdf(limit) ** 2),
+    "two sides": (
+        lambda u: np.maximum(u[:, 0], -u[:, 1]),
+        3,
+        lambda limit: 1.0 - stats.norm.cdf(limit) ** 2,
+    ),
     "rough": (rough, 4, waves),
 }
 

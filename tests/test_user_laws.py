@@ -77,10 +77,6 @@ def zhiying(d, v, v0, k):
     return k * d**1.5 * (1 + 3 * (1 - e**2) * math.exp(2 * (1 - e)) * v / (4 * v0))
 
 
-def stribeck(v):
-    return (0.05 + 0.05 * math.exp(-abs(v) / 0.5)) * math.tanh(v / 0.05)
-
-
 CASES = {
     "Zhiying and Qishao": (ZHIYING, NO_FRICTION, zhiying, None),
     "exponent 1.2": (
@@ -90,7 +86,8 @@ CASES = {
         EXPONENTIAL, NO_FRICTION, lambda d, v, v0, k: 500 * math.expm1(min(d / 5e-5, 99.0)) * (1 + 0.3 * v), None,
     ),
     "a Stribeck curve": (
-        FORMULA, STRIBECK, lambda d, v, v0, k: k * d**1.5 * (1 + 0.5 * v), stribeck,
+        FORMULA, STRIBECK, lambda d, v, v0, k: k * d**1.5 * (1 + 0.5 * v),
+        lambda v: (0.05 + 0.05 * math.exp(-abs(v) / 0.5)) * math.tanh(v / 0.05),
     ),
 }  # fmt: skip
 
