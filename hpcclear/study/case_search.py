@@ -105,10 +105,8 @@ class CaseSearch:
             return self.designs.add(self._region.at(unit))
         rows, left = self._leaders(beliefs), list[tuple[float, Array]]()
         for _ in range(count):
-            sets, rest = divmod(len(self.designs) - self._begun, improvement.EXPLORED)
-            if rest == improvement.EXPLORED - 1:
-                beside = None if sets % 2 else beliefs.best(self._space.directions[0])
-                point, worth = improvement.farthest(beliefs, beside)
+            if (len(self.designs) - self._begun) % improvement.EXPLORED == improvement.EXPLORED - 1:
+                point, worth = improvement.farthest(beliefs)
                 if worth > 0.0:
                     beliefs.take(point)
                     rows += self.designs.add(point[None])
@@ -168,9 +166,11 @@ class CaseSearch:
         """The simulated design nearest to a place, if a new design there would have nearly the same error: then further
         simulations of the nearest one say more about both. None if it would not, or if the nearest one may have no more."""
         known = beliefs.known.designs
+        best = np.where(beliefs.allowed, beliefs.believed @ direction, np.inf).argmin()
         row = int(self._space.apart(known, place).argmin())
-        both = known[row], beliefs.best(direction)
-        off = [beliefs.apart(place[None], one)[0] @ direction**2 for one in both]
+        off = [
+            beliefs.apart(place[None], one)[0] @ direction**2 for one in (known[row], known[best])
+        ]
         return row if off[0] < ALIKE * off[1] and self._longer(row) else None
 
     def _leaders(self, beliefs: Beliefs) -> list[int]:

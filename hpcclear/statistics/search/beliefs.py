@@ -150,11 +150,6 @@ class Beliefs:
             [nothing if model is None else model.rest.apart(points, one) for model in self.models]
         )
 
-    def best(self, direction: Array) -> Array:
-        """The known design, (d,), that is taken for the best in a direction."""
-        row = np.where(self.allowed, self.believed @ direction, np.inf).argmin()
-        return np.asarray(self.known.designs[row])
-
     @property
     def noise(self) -> Array:
         """Variance of the error of one more design's objectives that no neighbour shares, (m,)."""

@@ -35,9 +35,8 @@ from scipy.special import ndtr
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.statistics.search.beliefs import LIKELY, Beliefs, Space
 
-EXPLORED, BESIDE = 5, 0.15
-"""One new design in so many is the farthest from all others, by turns of those all over the box and of those that differ from
-the best by no more than a part of the ranges: expected improvement trusts the model, which may be wrong, also nearby."""
+EXPLORED = 5
+"""One new design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
 
 WIDE, STEPS, LOCAL, CENTRES = 512, (0.2, 0.06, 0.02, 0.006), 64, 2
 """Candidates all over the box, and about each of the best designs at each of these parts of the ranges."""
@@ -64,14 +63,11 @@ def proposed(beliefs: Beliefs, direction: Array | None) -> tuple[Array, float]:
     return _best(beliefs, _merit(beliefs, direction))
 
 
-def farthest(beliefs: Beliefs, best: Array | None = None) -> tuple[Array, float]:
-    """The design, (d,), that is farthest from all that are known, where constraints are likely kept, of all or of those beside
-    the best; and how far."""
+def farthest(beliefs: Beliefs) -> tuple[Array, float]:
+    """The design, (d,), that is farthest from all that are known, where constraints are likely kept; and how far."""
 
     def merit(points: Array) -> Array:
         away = _distance(beliefs, points)
-        if best is not None:
-            away[beliefs.space.apart(points, best) > BESIDE] = 0.0
         return np.where(away > NEAR, away * beliefs.feasible(points), 0.0)
 
     return _best(beliefs, merit)
