@@ -236,7 +236,7 @@ def test_statistics_are_those_of_the_samples(tmp_path):
     words = ("sample", "jobs/quickstart.toml", *SHORT, *MONTE_CARLO)
     done = hpcclear(*words, "-o", out, "--statistics", "--raw", raw)
     assert done.returncode == 0, done.stderr
-    assert "mean of f" in done.stdout
+    assert "Mean gap" in done.stdout
     assert hpcclear(*words, "-o", tmp_path / "samples.nc").returncode == 0
     statistics = opened.read(out, "statistics")
     samples = opened.read(tmp_path / "samples.nc", "samples")

@@ -32,9 +32,7 @@ def test_the_range_in_which_samples_fail_is_named(seed):
     failed = (made[guilty].values > low) & (made[guilty].values < low + 0.2)
     told = where(failed, made)
     inside = made[guilty].values[failed]
-    assert told.startswith(
-        f"all at x{guilty} {inside.min():.4g} kg to {inside.max():.4g} kg (range 1"
-    )
+    assert told.startswith(f"all at x{guilty} {inside.min():.4g} to {inside.max():.4g} kg (range 1")
     assert told.endswith(f"where {failed.sum()} of {failed.sum()} failed")
 
 

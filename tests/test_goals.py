@@ -75,7 +75,7 @@ def test_words_tables_and_units_of_the_objective() -> None:
 @pytest.mark.parametrize(
     ("entries", "key", "reason"),
     [
-        ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "'median': is not one of the known values. Did you"),
+        ({"objectives": ["mean", "median"]}, "objectives.1", "'median': is not one of the known values. Did you"),
         ({"constraints": [{"statistic": "percentile", "most": "5 kN"}]}, "constraints.0.statistic", "is a quantile"),
         ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 5}]}, "constraints.0.most", "5: must be above 0 and"),
         ({"constraints": [{"statistic": "exceedance", "limit": 1, "most": 0}]}, "constraints.0.most", "it is a probability"),

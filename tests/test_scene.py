@@ -425,7 +425,7 @@ def test_a_study_that_leaves_out_the_scene_itself_is_worth_a_warning() -> None:
     path = next(path for path in JOBS if path.stem == "quickstart")
     assert not any("outside" in text for text in load_scene(path).warnings)
     heavy = load_scene(path, ["mechanism.rod.mass=0.55"])
-    assert any("0.105 to 0.42 kg" in text and "0.55 kg" in text for text in heavy.warnings)
+    assert any("0.105 kg to 0.42 kg" in text and "0.55 kg" in text for text in heavy.warnings)
 
 
 def test_schema_knows_the_word_that_switches_off() -> None:
