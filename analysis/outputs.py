@@ -44,7 +44,7 @@ OUTPUTS = {
         "run jobs/tolerances.toml",
         ("95th percentile of f", "cost", "fit", "trust"),
     ),
-    "constraint": Output("how-to/decisions.md", "run jobs/tolerances.toml", ("constraint",)),
+    "constraint": Output("how-to/decisions.md", "run jobs/tolerances.toml", ("constraint ",)),
     "halving": Output("how-to/decisions.md", "run jobs/tolerances.toml", ("tolerances",)),
 }
 
