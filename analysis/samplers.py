@@ -83,7 +83,7 @@ def report(folder: Path, mechanism: str, count: int, machines: int, members: int
     size = made.model.places.shape[1]
     errors, costs, memory = {"sequential": [], "emcee": []}, {"sequential": [], "emcee": []}, []
     for values, _ in pairs:
-        summaries = made.summarised(values)
+        summaries = np.array([float(one(values[None])[0]) for one in made.summaries])
         ends = {}
         for name, particles in (("reference", REFERENCE), ("sequential", PARTICLES), ("emcee", 0)):
             likelihood = Counted(made.model.likelihoods[0], summaries)

@@ -15,9 +15,8 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST
 from hpcclear.statistics.search import foreign
-from hpcclear.statistics.search.asking import SearchTask, minimise
+from hpcclear.statistics.search.asking import SearchTask, SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import Front, hypervolume
-from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import run_study
 
 UNIT = np.array([[0.0, 1.0]] * 6)

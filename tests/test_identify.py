@@ -19,7 +19,7 @@ from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout
 from hpcclear.identify.history import DAY, history, seconds_of
-from hpcclear.identify.inputs import Inputs, design
+from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
@@ -30,6 +30,7 @@ from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.identified import interval, lines, warnings
 from hpcclear.results.content import Results
 from hpcclear.results.signals import signals_in
+from hpcclear.scene.streams import generator, sobol
 
 SCENE = ROOT / "jobs" / "identify.toml"
 UNKNOWN = "joints.crank_rod.clearance=10um:150um"
@@ -189,7 +190,7 @@ def made(scene):
     """An ensemble by formula, and its preparation for a sensor with noise."""
     whole = Inputs.of(scene, [UNKNOWN])
     inputs = Inputs(scene, whole.unknowns, whole.random[:1])
-    places = design(1, inputs, 128)
+    places = sobol(inputs.size + 2, generator(1, "identify"), 0, 128)
     spectra = spectra_of(places, np.random.default_rng(2))
     ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
     seen = ensemble.spectrum("crank_moment")
@@ -239,7 +240,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     other = UNKNOWN.replace("crank_rod", "rod_slider")
     whole = Inputs.of(both, [UNKNOWN, other])
     inputs = Inputs(both, whole.unknowns, ())
-    places = design(1, inputs, 128)
+    places = sobol(inputs.size + 2, generator(1, "identify"), 0, 128)
     total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
     spectra = spectra_of(total, np.random.default_rng(2))
     ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)

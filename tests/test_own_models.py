@@ -16,8 +16,7 @@ from hpcclear.report.figures import fits
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import asking
-from hpcclear.statistics.search.asking import SearchTask
-from hpcclear.statistics.search.settings import SwarmSettings
+from hpcclear.statistics.search.asking import SearchTask, SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
 from hpcclear.statistics.surrogate.stored import models_in

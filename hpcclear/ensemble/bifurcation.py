@@ -13,7 +13,7 @@ from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
 from hpcclear.ensemble.session import Finished, Options, Session
-from hpcclear.ensemble.single import SHORTEST, TOGETHER, responses_of
+from hpcclear.ensemble.single import SHORTEST, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
@@ -108,7 +108,7 @@ def run_bifurcation(
         long = scene.with_(changes)
         short = simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
         asked = long, variants, observation, (count,), ranks, "bifurcation"
-        observed = responses_of(*asked, together=TOGETHER, checkpoint=session.opened())[:, 0]
+        observed = responses_of(*asked, checkpoint=session.opened())[:, 0]
         coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
         data = {points.names[0]: varied, "observed": observed}
         about = session.attributes, points.units, observation.described(short), points.words

@@ -247,7 +247,7 @@ def _may_pass(book: Book, chosen: Variant) -> bool:
     total = sum((_values(book, (k,)) for k in chosen), np.zeros(3))
     for pair in itertools.combinations(chosen, 2):
         if pair in book.seen:
-            total += interaction(book, pair)
+            total += _values(book, pair) - sum((_values(book, (k,)) for k in pair), np.zeros(3))
     return bool((np.abs(total[book.plan.counted]) <= book.plan.tolerance).all())
 
 
@@ -260,11 +260,6 @@ def _recommended(book: Book) -> Variant:
     least = min(book.work(one) for one in passed)
     near = [one for one in passed if book.work(one) * MUCH_LESS <= least]
     return min(near, key=lambda one: (-len(one), one))
-
-
-def interaction(book: Book, off: Variant) -> Array:
-    """By how much the changes (mean, standard deviation, force) of effects together exceed their sum."""
-    return _values(book, off) - sum((_values(book, (k,)) for k in off), np.zeros(3))
 
 
 def _values(book: Book, off: Variant) -> Array:

@@ -82,9 +82,6 @@ def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
 
 # ---- what is written -------------------------------------------------------------------------------
 
-RESPONSES = ("mean", "deviation", "peak force")
-"""Labels along the dimension ``response``."""
-
 
 def times_of(seconds: Mapping[str, Sequence[float]]) -> dict[str, str]:
     """Attributes of the file of times, from what `Trial.seconds` measured: medians of the rounds, and all of them."""
@@ -124,7 +121,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     coords = {
         "variant": np.arange(len(variants)),
         "effect": np.array([one.name for one in trial.switches], dtype=str),
-        "response": np.array(RESPONSES, dtype=str),
+        "response": np.array(["mean", "deviation", "peak force"]),
     }
     attrs = {**attributes, "tolerance": plan.tolerance, "confidence": plan.confidence}
     attrs |= {"reduced_scene": reduced.to_toml(), "kept": json.dumps(trial.kept)}

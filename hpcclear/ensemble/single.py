@@ -23,7 +23,7 @@ SHORTEST = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions"
 """Entries of a scene whose response is one revolution: for names and units of its series, or to compile."""
 
 TOGETHER = 8
-"""Responses in a batch where many are wanted and their memory is small."""
+"""Responses in a batch, which share the memory of a rank; results do not depend on it."""
 
 
 def responses_of(
@@ -34,7 +34,6 @@ def responses_of(
     ranks: Ranks,
     stage: str,
     copies: int = 1,
-    together: int = 1,
     checkpoint: Checkpoint | None = None,
     kept: str = "",
 ) -> Array:
@@ -42,12 +41,12 @@ def responses_of(
 
     A variant is what is other in the scene, by paths; the study is left out. `evaluate`: a function of a module, of a variant
     and its response, which returns values of `shape`. `copies`: starts of each variant; all but the first are perturbed.
-    `together`: responses in a batch, which share the memory of a rank; results do not depend on it. The checkpoint has those
-    that were finished earlier, and gets each new one as its stage `kept`, by default `stage`, the name for reports and timing.
+    The checkpoint has those that were finished earlier, and gets each new one as its stage `kept`, by default `stage`, the
+    name for reports and timing.
     Raises Stopped, RankFailed, InputError. Raises StorageError: the disk refuses a checkpoint.
     """
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
-    payload = ResponsesPayload(content_of(scene), variants, evaluate, dtype, together)
+    payload = ResponsesPayload(content_of(scene), variants, evaluate, dtype)
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
     task = Task(stage, Responses, payload, dtype)
     if checkpoint is None:
@@ -95,17 +94,16 @@ class ResponsesPayload(NamedTuple):
     variants: Sequence[Mapping[str, object]]
     evaluate: Callable[[Scene, Results], Array]
     dtype: np.dtype
-    together: int
 
 
 class Responses:
     """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
 
     def __init__(self, payload: ResponsesPayload, ranks: Ranks) -> None:
-        content, self._variants, self._evaluate, self._dtype, self._together = payload
+        content, self._variants, self._evaluate, self._dtype = payload
         self._scene = load_scene(content, trust=True)
         # as many under way, and one in stock: who hands out may be at one of its own
-        self.lanes = 1 + self._together
+        self.lanes = 1 + TOGETHER
         self._queue: list[tuple[int, int, int]] = []
         self._begun: Iterator[np.ndarray] = iter(())
         self._unfinished = 0
@@ -123,7 +121,7 @@ class Responses:
     def advance(self, seconds: float) -> np.ndarray:
         """The record of the next one, shape (1,), however long it takes; (0,) if there is none."""
         if not self._unfinished and self._queue:
-            taken, self._queue = self._queue[: self._together], self._queue[self._together :]
+            taken, self._queue = self._queue[:TOGETHER], self._queue[TOGETHER:]
             self._unfinished, self._begun = len(taken), self._records(taken)
         if not self._unfinished:
             return np.zeros(0, self._dtype)

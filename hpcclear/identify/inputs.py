@@ -15,7 +15,6 @@ from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import offsets
-from hpcclear.scene.streams import generator, sobol
 
 
 @dataclass(frozen=True)
@@ -116,8 +115,3 @@ class Inputs:
 
         drawn = ndtri(np.clip(places[:, self.size : self.size + 2], 1e-9, 1.0 - 1e-9))
         return sensor.gain_error * drawn[:, 0], sensor.angle_error * drawn[:, 1]
-
-
-def design(seed: int, inputs: Inputs, members: int) -> Array:
-    """Return the places (members, size + 2) of an ensemble over the prior: a randomised Sobol sequence."""
-    return sobol(inputs.size + 2, generator(seed, "identify"), 0, members)

@@ -47,10 +47,6 @@ class Prepared:
         """Names of the features."""
         return tuple(label for one in self.layouts for label in one.labels)
 
-    def summarised(self, values: Array) -> Array:
-        """Return the summaries (q,) of features (p,)."""
-        return np.array([float(one(values[None])[0]) for one in self.summaries])
-
 
 @dataclass(frozen=True)
 class Judgement:
@@ -126,7 +122,7 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
     """Return what the features (p,) of a measurement say."""
     with one_thread():
         rng = np.random.default_rng([seed, 0x706F])
-        summaries = prepared.summarised(values)
+        summaries = np.array([float(one(values[None])[0]) for one in prepared.summaries])
         mean = prepared.centre + prepared.unit * prepared.expected(summaries)
         rest = (values - mean) / prepared.unit
         found = prepared.model.posterior(summaries, particles, rng)

@@ -8,14 +8,15 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.single import TOGETHER, responses_of
-from hpcclear.identify.inputs import Inputs, design
+from hpcclear.ensemble.single import responses_of
+from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.signals import INSTANTS, ORDERS, PARTS, Spectrum, spectra
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.terminal import Style, announce
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
+from hpcclear.scene.streams import generator, sobol
 
 CHUNK = 64
 """Members that are simulated together, and reported."""
@@ -64,7 +65,7 @@ def ensemble_of(
 
     Raises InputError: more than `LARGEST_FAILURE` of the members fail. Raises Stopped, RankFailed, StorageError.
     """
-    places = design(seed, inputs, members)
+    places = sobol(inputs.size + 2, generator(seed, "identify"), 0, members)
     variants = inputs.variants(places)
     shape = (len(names), PARTS, ORDERS + 1)
     parts = []
@@ -72,7 +73,7 @@ def ensemble_of(
         rows, reduced = variants[first : first + CHUNK], partial(spectra, names=tuple(names))
         found = responses_of(
             scene, rows, reduced, shape, ranks, "ensemble",
-            together=TOGETHER, checkpoint=checkpoint, kept=f"members-{first:06d}",
+            checkpoint=checkpoint, kept=f"members-{first:06d}",
         )  # fmt: skip
         parts.append(found[:, 0])
         announce(f"ensemble: {first + len(parts[-1])} of {members} members", style)

@@ -146,11 +146,6 @@ class Accumulator:
         self._ahead: dict[int, Summary] = {}
 
     @property
-    def complete(self) -> bool:
-        """Whether every sample was taken."""
-        return self._next * self.block >= self.total
-
-    @property
     def taken(self) -> int:
         """Samples taken so far."""
         summed = sum(int(one.status.sum()) for one in (self._whole, *self._ahead.values()))
@@ -180,7 +175,7 @@ class Accumulator:
 
     def result(self) -> Summary:
         """Statistics of the whole design. Raises RuntimeError if samples are missing."""
-        if not self.complete:
+        if self._next * self.block < self.total:
             raise RuntimeError("statistics were requested before every sample has finished")
         return self._whole
 

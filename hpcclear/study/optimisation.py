@@ -16,10 +16,9 @@ from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
 from hpcclear.statistics.search import foreign
-from hpcclear.statistics.search.asking import Search, SearchTask, made, minimise
+from hpcclear.statistics.search.asking import Search, SearchTask, SwarmSettings, made, minimise
 from hpcclear.statistics.search.mopso import swarm
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
-from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import surrogates
 from hpcclear.study.goals import ends_in_all

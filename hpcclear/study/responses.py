@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulated
-from hpcclear.ensemble.single import TOGETHER, responses_of
+from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
 from hpcclear.results.content import Results
 from hpcclear.results.dataset import variable_name
@@ -72,10 +72,10 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     revolutions = settings.response_revolutions * settings.response_windows
     windows, copies = settings.response_windows, settings.response_copies
     variants = [_changes(run, choice, revolutions) for _, choice in chosen]
-    shape = windows, len(STATISTICS), _quantities(run.scene)
-    work = partial(_statistics, windows=windows)
+    shape = windows, len(STATISTICS), len(run.scene.joint_labels) + 2
+    work = partial(_statistics, shape=shape)
     what = run.scene, variants, work, shape, run.ranks, "responses: simulations"
-    table = responses_of(*what, copies=copies, together=TOGETHER)
+    table = responses_of(*what, copies=copies)
     return {"names": np.array([name for name, _ in chosen]), "statistics": table}
 
 
@@ -106,23 +106,18 @@ def _steady(scene: Scene, response: Results) -> Results:
     return kept.assign_attrs(transient_turns=0)
 
 
-def _statistics(scene: Scene, response: Results, windows: int) -> Array:
-    """Statistics of each segment of a steady response, (windows, statistics, quantities); NaN if it failed."""
-    shape = (windows, len(STATISTICS), _quantities(scene))
+def _statistics(scene: Scene, response: Results, shape: tuple[int, int, int]) -> Array:
+    """Statistics of each segment of a steady response, of shape (windows, statistics, quantities); NaN if it failed."""
     if int(response["status"]) != Status.OK:
         return np.full(shape, np.nan)
     steady = _steady(scene, response)
     widths = {"contact_force": len(scene.joint_labels), "crank_moment": 1, "slider_acceleration": 1}
-    table = np.full((steady.sizes["time"], sum(widths.values())), np.nan)
+    table = np.full((steady.sizes["time"], shape[2]), np.nan)
     begin = 0
     for name, width in widths.items():
         if name in steady:  # a linkage may have no slider
             table[:, begin : begin + width] = steady[name].values.reshape(-1, width)
         begin += width
-    parts = np.array_split(table, windows)
+    parts = np.array_split(table, shape[0])
     found = [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
     return np.array(found)
-
-
-def _quantities(scene: Scene) -> int:
-    return len(scene.joint_labels) + 2

@@ -156,7 +156,9 @@ _BEFORE_VERIFICATION = ("wear", "sensitivity", "surrogates", "search")
 
 def _of_verification(scene: Scene) -> dict[str, int]:
     study = scene.required_study
-    failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
+    settings = study.verification
+    kept = [goal for case in study.cases for goal in case.kept if verdicts.rare(goal, settings)]
+    failing = int(sum(verdicts.usual(goal, settings) for goal in kept))
     each = truth.expected(study) + failing // len(study.cases)
     designs = _designs(scene)
     before = [stage.samples(scene) for stage in STAGES if stage.name in _BEFORE_VERIFICATION]

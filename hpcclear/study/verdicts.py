@@ -17,7 +17,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.verdict import Verdict
-from hpcclear.scene.cases import Case, Constraint
+from hpcclear.scene.cases import Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Limited
@@ -124,11 +124,6 @@ def usual(goal: Constraint, settings: Verification) -> float:
     if rare(goal, settings):
         return float(min(WEIGHTED, max(2 * settings.most_samples, FEWEST)))
     return HITS / goal.most if goal.statistic == "exceedance" and goal.most > 0.0 else 0.0
-
-
-def usual_in(case: Case, settings: Verification) -> int:
-    """Simulations of a design for the rare failures of its case, beside those for mean and standard deviation."""
-    return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
 
 
 def costs(study: Study, unit: str) -> Iterator[str]:

@@ -64,12 +64,8 @@ def of_designs(run: StudyRun, choices: Sequence[Choice]) -> Result:
     result: Result = {name: np.full(len(choices), np.nan) for name in ("worst", "worst_corner")}
     result["searched_at"] = np.full((len(choices), len(names)), np.nan)
     result["tried"] = np.zeros(len(choices), np.int64)
-    hidden = (
-        " averaged ",
-        " best ",
-        " candidate ",
-        " paper ",
-    )  # all but ends, points of the front, the baseline
+    # all but ends, points of the front, the baseline
+    hidden = (" averaged ", " best ", " candidate ", " paper ")
     shown = [k for k, one in enumerate(choices) if not any(word in one.name for word in hidden)]
     for case in run.study.cases:
         rows = [k for k in shown if choices[k].case == case.name]

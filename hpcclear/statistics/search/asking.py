@@ -16,14 +16,27 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.sources import in_use
 from hpcclear.statistics.search.pareto import Archive, Front, best_subset, cut, relative_gain
-from hpcclear.statistics.search.settings import SwarmSettings
 
 KEY = "study.swarm.algorithm"
-SETTLED = 1e-3
-"""Relative gain of hypervolume over the last tenth of the evaluations, below which a search has settled."""
 
 Function = Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 """Designs (n, d) to objectives (n, m), all minimised; or a tuple of them and violations (n,) or (n, c), > 0 where broken."""
+
+
+@dataclass(frozen=True)
+class SwarmSettings:
+    """Settings of the swarm. The defaults are the one documented setting; what a study sets of them its scene has checked."""
+
+    particles: int = 100
+    c1: float = 1.8  # pull to the particle's own best
+    c2: float = 1.8  # pull to its leader
+    inertia_first: float = 1.2  # w_max of eq. 23
+    inertia_last: float = 0.1  # w_min of eq. 23
+    speed_limit: float = 0.5  # of each variable's range, per iteration
+    mutation_share: float = 0.2
+    mutation_index: float = 20.0  # of the polynomial distribution; larger is nearer
+    archive_capacity: int = 400
+    tournament: int = 3
 
 
 @dataclass(frozen=True)
@@ -102,7 +115,6 @@ class _Met:
         self.archive = Archive(task.settings.archive_capacity, *nothing)
         self.earlier = self.archive.values
         self.evaluations = self.failed = self.infeasible = 0
-        self.least = np.inf
         self._late = (task.iterations - max(1, task.iterations // 10)) * task.particles
 
     def add(self, designs: Array, values: Array, broken: Array) -> None:
@@ -114,7 +126,6 @@ class _Met:
         self.evaluations += len(designs)
         self.failed += int(failed.sum())
         self.infeasible += int((~failed & ~feasible).sum())
-        self.least = min(self.least, float(broken.min()))
         if self.evaluations <= self._late:
             self.earlier = self.archive.values
 
@@ -126,32 +137,14 @@ class _Met:
         kept = (best_subset if self.infeasible else cut)(values, size)
         if len(kept):
             kept = kept[np.lexsort(values[kept].T[::-1])]
-        gain = relative_gain(self.earlier, values)
-        done = self.evaluations >= self.task.evaluations
         return Front(
             points=self.archive.positions[kept],
             values=values[kept],
             evaluations=self.evaluations,
             failed=self.failed,
             infeasible=self.infeasible,
-            gain=gain,
-            settled=bool(done and gain < SETTLED),
-            remark=self._remark(gain),
+            gain=relative_gain(self.earlier, values),
         )
-
-    def _remark(self, gain: float) -> str:
-        if not len(self.archive):
-            return f"no feasible point in {self.evaluations} evaluations; least violation {self.least:g}"
-        if np.isnan(gain):
-            text = "convergence not known: no feasible design before the last iterations"
-        else:
-            word = "settled" if gain < SETTLED else "still improving, give it more iterations"
-            text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
-        if len(self.archive) == 1 and self.objectives > 1:
-            text += "; one point only: the objectives do not conflict, or the search collapsed"
-        if self.failed:
-            text += f"; {self.failed} of {self.evaluations} points failed"
-        return text
 
 
 def _asked(search: Search, name: str, bounds: Array) -> Array:

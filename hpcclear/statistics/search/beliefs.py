@@ -93,10 +93,6 @@ class Trended:
         """What is expected at points, (n, d) to (n,)."""
         return self.rest.predict(points) + self.slope * self.trend(points)
 
-    def variance(self, points: Array) -> Array:
-        """What is not known of it, (n, d) to (n,)."""
-        return self.rest.variance(points)
-
 
 class Beliefs:
     """Models of all objectives and constraints over designs. Raises InputError: fewer than d + 3 finite values.
@@ -114,7 +110,7 @@ class Beliefs:
         count, width = len(space.exact), known.excess.shape[1]
         none: list[Trended | None] = [None] * (count + width)
         found = list[Trended | None]()
-        trends = space.trends or [_nothing] * len(none)
+        trends = space.trends or [lambda points: np.zeros(len(points))] * len(none)
         for exact, values, errors, shifts, trend, last in zip(
             [*space.exact, *[None] * width], np.hstack([known.values, known.excess]).T,
             np.hstack([known.errors, known.excess_errors]).T, [*known.shifts, *[None] * width], trends,
@@ -140,7 +136,7 @@ class Beliefs:
         """What is not known of it, (n, d) to (n, m)."""
         nothing = np.zeros(len(points))
         return np.column_stack(
-            [nothing if model is None else model.variance(points) for model in self.models]
+            [nothing if model is None else model.rest.variance(points) for model in self.models]
         )
 
     def apart(self, points: Array, one: Array | None = None) -> Array:
@@ -160,7 +156,7 @@ class Beliefs:
         margins = self.space.margins if margins is None else margins
         none = np.empty((len(points), 0))
         means = [one.predict(points)[:, None] for one in self.limits]
-        spreads = [np.sqrt(one.variance(points))[:, None] for one in self.limits]
+        spreads = [np.sqrt(one.rest.variance(points))[:, None] for one in self.limits]
         return np.hstack([none, *means]) + margins, np.hstack([none, *spreads]) + 1e-12
 
     def feasible(self, points: Array) -> Array:
@@ -180,11 +176,6 @@ class Beliefs:
         later = self.pending[self.feasible(self.pending) >= LIKELY]
         designs = np.vstack([self.known.designs[self.allowed], later])
         return designs, np.vstack([self.believed[self.allowed], self.means(later)])
-
-
-def _nothing(points: Array) -> Array:
-    """The trend where there is none."""
-    return np.zeros(len(points))
 
 
 class _Evaluated(NamedTuple):

@@ -1,8 +1,5 @@
 """Algorithms of pymoo instead of the swarm, through `ask` and `tell`: same evaluations, same constraints, same kind of front.
 
-Whatever an algorithm keeps of what it met, the front is made as the swarm's: the archive of all feasible designs that no
-other one dominates, cut to size. A design whose objectives are not all finite breaks constraints without limit.
-
 Source: J. Blank and K. Deb, "pymoo: multi-objective optimization in Python", IEEE Access 8 (2020),
 doi:10.1109/ACCESS.2020.2990567. It is an extra and is imported when a search begins, never with the package.
 """

@@ -32,7 +32,7 @@ from scipy.linalg.lapack import dpstrf
 from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
-from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.arrays import Array
 from hpcclear.statistics.search.beliefs import LIKELY, Beliefs, Space
 
 EXPLORED = 5
@@ -93,7 +93,7 @@ def drawn(beliefs: Beliefs, direction: Array, count: int) -> tuple[Array, float]
     least[mean <= mean.min(initial=np.inf)] = -np.inf  # the best is drawn first: losses are its own
     may = np.argsort(least, kind="stable")[: min((least <= mean.min(initial=np.inf)).sum(), MOST)]
     points, mean = points[may], mean[may]
-    new = _apart(points, beliefs)
+    new = _distance(beliefs, points) > NEAR
     if not new.any():
         return points[:0], 0.0
     square = np.zeros((len(points), len(points)))
@@ -151,7 +151,7 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
             means, spreads = beliefs.shortfalls(points)
             rows = np.arange(len(points)), means.argmax(axis=1)
             won = gain(np.full(len(points), least), means[rows], spreads[rows])
-            return won * _apart(points, beliefs)
+            return won * (_distance(beliefs, points) > NEAR)
 
         return nearer
     weights = beliefs.rng.dirichlet(np.ones(front.shape[1]))
@@ -170,7 +170,7 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
             won = volume(front, mean, deviation)
         else:
             won = _scalarised(front, mean + deviation * noise, weights)
-        return won * beliefs.feasible(points) * _apart(points, beliefs)
+        return won * beliefs.feasible(points) * (_distance(beliefs, points) > NEAR)
 
     return function
 
@@ -256,11 +256,6 @@ def _about(centre: Array, step: float, space: Space, rng: np.random.Generator) -
     moves = step * (high - low) * rng.uniform(-1.0, 1.0, (LOCAL, len(low)))
     moves *= rng.random(moves.shape) < 0.6
     return np.clip(centre + moves, low, high)
-
-
-def _apart(points: Array, beliefs: Beliefs) -> Booleans:
-    """Whether designs differ from all that were evaluated or chosen, (n,)."""
-    return _distance(beliefs, points) > NEAR
 
 
 def _distance(beliefs: Beliefs, points: Array) -> Array:

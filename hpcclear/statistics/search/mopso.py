@@ -31,9 +31,8 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.search import asking, children
-from hpcclear.statistics.search.asking import Function, SearchTask
+from hpcclear.statistics.search.asking import Function, SearchTask, SwarmSettings
 from hpcclear.statistics.search.pareto import Archive, Front
-from hpcclear.statistics.search.settings import SwarmSettings
 
 BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""

@@ -16,9 +16,8 @@ class Front:
 
     `failed` counts points whose objectives were not finite, `infeasible` the others that broke a
     constraint; both are part of `evaluations`. `gain` is the share of the hypervolume won in the
-    last tenth of the iterations, NaN if unknown; `settled` says that all iterations were done and
-    the gain is below 1e-3. A settled search may still sit on a local front: compare several seeds.
-    `remark` says this in words.
+    last tenth of the iterations, NaN if unknown. A search with little gain may still sit on a local
+    front: compare several seeds.
     """
 
     points: Array
@@ -27,8 +26,6 @@ class Front:
     failed: int
     infeasible: int
     gain: float
-    settled: bool
-    remark: str
 
 
 class Archive:

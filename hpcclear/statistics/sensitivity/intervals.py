@@ -43,9 +43,6 @@ class IntervalSettings:
         return least_points(variables) if self.chosen else n_terms(variables, self.order)
 
 
-DEFAULTS = IntervalSettings()
-
-
 @dataclass(frozen=True)
 class IntervalDesign:
     """Points to simulate for every interval and clearance, all known beforehand."""
@@ -110,7 +107,7 @@ def design_intervals(
     bounds: ArrayLike,
     clearances: ArrayLike,
     rng: np.random.Generator,
-    settings: IntervalSettings = DEFAULTS,
+    settings: IntervalSettings,
 ) -> IntervalDesign:
     """Lay out the samples of every interval at every clearance.
 

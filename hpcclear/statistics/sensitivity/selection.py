@@ -7,11 +7,7 @@ Section 4.2 of the paper, step 4, leaves "greater impact" open. The rule here:
    compare with metres.
 2. At each clearance the effects are measured against the largest one that differs significantly from 0 (by
    more than z standard errors, z being the normal quantile of the stated confidence). A variable is
-
-   - influential, if its effect differs significantly from 0 and reaches the stated fraction of the largest;
-   - negligible, if its effect plus z standard errors stays below that fraction, or its effect
-     differs significantly from 0 and lies below;
-   - undecided otherwise: the standard error is too large, or there is no estimate.
+   influential there if its own differs significantly from 0 and reaches the stated fraction of the largest.
 
 3. A variable is selected if it is influential at no less than the stated share of the clearances
    that have an estimate of it. So one clearance alone neither brings a variable in nor throws it
@@ -22,7 +18,6 @@ its own, and being selected in one is enough.
 """
 
 from collections.abc import Sequence
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -32,21 +27,11 @@ from scipy.special import ndtri
 from hpcclear.base.arrays import Array, Booleans
 
 
-class Influence(IntEnum):
-    """Verdict on one variable at one clearance."""
-
-    UNDECIDED = 0
-    NEGLIGIBLE = 1
-    INFLUENTIAL = 2
-
-
 class Selection(NamedTuple):
     """Ranking and selection; m columns, each a variable in a surface."""
 
     effect: Array
     """Shape (c, m): magnitude of the derivative times the interval length, in the unit of f."""
-    influence: NDArray[np.int8]
-    """Shape (c, m): `Influence` at each clearance."""
     selected: tuple[str, ...]
     """X_G-I, each name once, the largest mean relative effect first."""
 
@@ -77,14 +62,10 @@ def select_influential(
     distinct = effect > margin
     largest = np.max(effect, axis=1, where=distinct, initial=0.0)[:, np.newaxis]
     threshold = np.where(largest > 0.0, fraction * largest, np.nan)  # all comparisons then fail
-    influence = np.full(effect.shape, Influence.UNDECIDED, np.int8)
-    influence[distinct & (effect >= threshold)] = Influence.INFLUENTIAL
-    small = (effect < threshold) & (distinct | (effect + margin < threshold))
-    influence[small] = Influence.NEGLIGIBLE
-    reached = _mean_known(influence == Influence.INFLUENTIAL, known)
+    reached = _mean_known(distinct & (effect >= threshold), known)
     relative = _mean_known(effect / np.where(largest > 0.0, largest, np.nan), known)
     order = [j for j in np.argsort(-relative, kind="stable") if reached[j] >= share]
-    return Selection(effect, influence, tuple(dict.fromkeys(names[j] for j in order)))
+    return Selection(effect, tuple(dict.fromkeys(names[j] for j in order)))
 
 
 def _mean_known(quantity: NDArray[np.generic], known: Booleans) -> Array:

@@ -39,11 +39,6 @@ class Errors(NamedTuple):
         common = None if self.common is None else np.pad(self.common, (0, 1))
         return Errors(np.append(self.own, np.median(self.own)), common)
 
-    def variances(self, noise: float) -> Array:
-        """Of the errors, own and common, (n,), where the noise variance is `noise`."""
-        common = 0.0 if self.common is None else np.diag(self.common)
-        return noise * self.own + common
-
     def added(self, covariance: Array, noise: float) -> None:
         """Add them to a covariance matrix of the values, (n, n)."""
         covariance[np.diag_indices_from(covariance)] += noise * self.own

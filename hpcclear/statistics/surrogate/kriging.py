@@ -175,7 +175,8 @@ class Kriging:
     def error_variances(self) -> Array:
         """Variances of the errors of the training values, (n,), in squared units of these."""
         errors = self.errors or Errors(np.ones(len(self.values)))
-        return self.scale**2 * errors.variances(self.noise_variance)
+        common = 0.0 if errors.common is None else np.diag(errors.common)
+        return self.scale**2 * (self.noise_variance * errors.own + common)
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).

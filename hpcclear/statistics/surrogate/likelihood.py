@@ -78,20 +78,15 @@ def maximise(
     starts = [np.log(one) for one in known]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     parts = _parts(len(values), draws)
-    if len(parts) == 1:
-        top = _climbed(starts, limits, tolerance, centred, values, kernel, errors)
-    else:
+    if len(parts) > 1:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
-        first = parts[0]
-        top = _climbed(
-            starts, limits, tolerance, centred[first], values[first], kernel, errors.of(first)
-        )
-        top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
-        for part in parts[1:]:
-            top = _climbed(
-                [top], limits, tolerance, centred[part], values[part], kernel, errors.of(part)
-            )
+    for number, part in enumerate(parts, 1):
+        seen = centred[part], values[part], kernel, errors.of(part)
+        top = _climbed(starts, limits, tolerance, *seen)
+        if number == 1 < len(parts):
+            top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
+        starts = [top]
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
@@ -106,8 +101,6 @@ def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
     sizes = [count]
     while sizes[0] >= 2 * PART:
         sizes.insert(0, sizes[0] // 2)
-    if len(sizes) == 1:
-        return [np.arange(count)]
     order = draws.permutation(count)
     return [np.sort(order[:size]) for size in sizes]
 

@@ -18,8 +18,6 @@ from hpcclear.statistics.surrogate.response_surface import Evaluate, latin_hyper
 Method = KrigingMethod | RegressionMethod
 """A kind of surrogate with its settings: it is fitted, and restored from stored arrays."""
 
-KRIGING = KrigingMethod()
-
 
 @dataclass(eq=False)
 class _Box:
@@ -55,7 +53,7 @@ def fit_subintervals(
     *,
     rng: np.random.Generator,
     names: Sequence[str] | None = None,
-    method: Method = KRIGING,
+    method: Method,
     snap: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> Piecewise:
     """Fit models on subintervals of the domain `bounds` (d, 2) until each is accepted or a limit is reached.

@@ -15,7 +15,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
 from hpcclear.ensemble.session import sample_points
-from hpcclear.ensemble.single import TOGETHER, responses_of
+from hpcclear.ensemble.single import responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.report.figures.motion import eccentricity
 from hpcclear.results import dataset
@@ -137,7 +137,7 @@ def _over_steps(
                 for name, value in zip(batch.names, row, strict=True):
                     variants[-1] |= dict.fromkeys(run.study.variable(name).paths, float(value))
     what = _scene(run, reading), variants, _mean_over_steps, (), run.ranks
-    f = responses_of(*what, f"{STAGE}: simulations", together=TOGETHER)
+    f = responses_of(*what, f"{STAGE}: simulations")
     parts = f.reshape(len(designs), -1)
     return [(*_moments(part[:-1, None]), float(part[-1])) for part in parts]
 
@@ -186,7 +186,7 @@ def _read(run: StudyRun, reading: Interpretation, points: Points) -> Points:
     for joint in JOINTS:
         bearing = np.full(len(points), built[joint])
         if not reading.bearing_fixed:
-            bearing = BUILT_JOURNAL + clearance
+            bearing = 19.95e-3 + clearance  # the journal's radius as built, m (the paper's Table 2)
             add(f"joints.{joint}.bearing_radius", bearing)
         if not reading.with_journal_radius:
             # K is proportional to the moduli, so they can take the factor 1 / sqrt(R_J)
@@ -194,7 +194,3 @@ def _read(run: StudyRun, reading: Interpretation, points: Points) -> Points:
                 path = f"joints.{joint}.{part}.youngs_modulus"
                 add(path, run.scene.number(path) / np.sqrt(bearing - clearance))
     return Points(tuple(names), np.hstack(columns), tuple(paths))
-
-
-BUILT_JOURNAL = 19.95e-3
-"""Radius of the journal as built, m (the paper's Table 2)."""
