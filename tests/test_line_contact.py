@@ -123,7 +123,7 @@ def test_a_geometry_holds_what_laws_have_to_hold(name, law):
         "liner_poisson_ratio": 0.4, "force_at": 1e3, "depth_at": 2e-6, "exponent": 1.1,
         "depth_scale": 1.0, "force_scale": 1.0,
     }  # fmt: skip
-    check(made, {one.name: values[one.name] for one in made.parameters})
+    check(made, tuple((one.name, values[one.name]) for one in made.parameters))
 
 
 # ---- in a scene ---------------------------------------------------------------------------------------------

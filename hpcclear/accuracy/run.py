@@ -1,7 +1,7 @@
 """The `accuracy` command: panels one after the other, measured, kept, written, drawn."""
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -130,14 +130,11 @@ class Panels:
         self.attributes["study"] = where
         profile, ranks = self.profile, self.ranks
 
-        def simulated(simulate: Simulate) -> Callable[[], Variables]:
-            def work() -> Variables:
-                values, each = simulate(studied, case, profile, ranks)
-                return {"values": values, "each": np.array(each)}
+        def simulated(simulate: Simulate) -> Variables:
+            values, each = simulate(studied, case, profile, ranks)
+            return {"values": values, "each": np.array(each)}
 
-            return work
-
-        designs = self.kept("simulations-of-designs", simulated(surrogate.simulate))
+        designs = self.kept("simulations-of-designs", partial(simulated, surrogate.simulate))
         seconds = float(designs["each"])
 
         @cache
@@ -145,7 +142,7 @@ class Panels:
             return surrogate.measure(studied, case, profile, designs["values"], seconds)
 
         self.panel("surrogates", lambda: fitted()[0])
-        draws = self.kept("simulations-of-draws", simulated(random_inputs.simulate))
+        draws = self.kept("simulations-of-draws", partial(simulated, random_inputs.simulate))
 
         def moments() -> Variables:
             values, each = draws["values"], float(draws["each"])

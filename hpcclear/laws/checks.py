@@ -334,12 +334,8 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
 
 
 @lru_cache(maxsize=256)
-def _checked(law: Law, values: tuple[tuple[str, object], ...]) -> None:
+def check(law: Law, values: tuple[tuple[str, object], ...]) -> None:
+    """All of them, once for each law and values of its parameters. Raises LawError: the first that fails."""
     check_shape(law)
     check_units(law, dict(values))
     check_numbers(law, dict(values))
-
-
-def check(law: Law, values: Mapping[str, object]) -> None:
-    """All of them, once for each law and values of its parameters. Raises LawError: the first that fails."""
-    _checked(law, tuple(values.items()))

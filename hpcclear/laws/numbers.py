@@ -122,10 +122,9 @@ def force_of(law: ContactLaw, given: Mapping[str, object]) -> Array:
     return evaluate(law.elastic, given) * evaluate(law.factor, given)
 
 
-def rows_of(law: Law, given: Mapping[str, object], size: int) -> Array:
-    """The numbers that its functions read in the lanes, shape (m, at most `LAW_NUMBERS`), in the order of ``law.read``."""
+def rows_of(law: Law, found: Mapping[str, Any], size: int) -> Array:
+    """Those of `sample_numbers` that its functions read in lanes, (m, at most `LAW_NUMBERS`), in the order of ``law.read``."""
     assert len(law.read) <= LAW_NUMBERS
-    found = sample_numbers(law, given)
     columns = [np.broadcast_to(np.asarray(found[name], float), size) for name in law.read]
     return np.stack(columns, axis=-1) if columns else np.empty((size, 0))
 

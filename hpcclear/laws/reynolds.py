@@ -20,7 +20,6 @@ from hpcclear.base.bits import no_less
 from hpcclear.base.jit import lane_function
 
 EIGHTH = math.tan(math.pi / 8.0)
-HALF_TURN = math.pi
 
 TINY = 1e-300  # keeps the direction of a film at rest defined (and zero)
 
@@ -54,10 +53,10 @@ def half_circle_angle(a, s, r2):
     flat, steep = s <= EIGHTH * size, size <= EIGHTH * s
     over = size if flat else (-s if steep else s + size)
     under = s if flat else (size if steep else s - size)
-    base = 0.0 if flat else (HALF_TURN / 2.0 if steep else HALF_TURN / 4.0)
+    base = 0.0 if flat else (math.pi / 2.0 if steep else math.pi / 4.0)
     both = 1.0 / (over * r2)
     angle = base + small_arctan(under * (both * r2))
-    return (angle if a <= 0.0 else HALF_TURN - angle), both * over
+    return (angle if a <= 0.0 else math.pi - angle), both * over
 
 
 @lane_function

@@ -18,13 +18,8 @@ from hpcclear.dynamics.physics import powers
 '''
 
 _GIVEN = {
-    "contact": {
-        "depth": "depth",
-        "rate": "rate",
-        "impact_speed": "1.0 / (inverse + (1.0 - active))",  # in flight 1 m/s, of no consequence
-        "inverse_impact_speed": "inverse",
-    },
-    "friction": {name: name for name in VARYING["friction"]},
+    "impact_speed": "1.0 / (inverse + (1.0 - active))",  # in flight 1 m/s, of no consequence
+    "inverse_impact_speed": "inverse",
 }
 _SIGNATURES = {
     "contact": "par, row, depth, rate, inverse, active, i, W",
@@ -47,7 +42,8 @@ def text_of(law: Law) -> str:
 def _call(law: Law, name: str, **others: str) -> str:
     """The call of one of its functions, in words of `_SIGNATURES`; `others`: what is given otherwise."""
     rows = {number: f"par[(row + {k}) * W + i]" for k, number in enumerate(law.read)}
-    given = {**rows, **_GIVEN[law.kind], **others}
+    varying = {name: _GIVEN.get(name, name) for name in VARYING[law.kind]}
+    given = {**rows, **varying, **others}
     asked = law.arguments(law.functions()[name])
     return f"own_{name}({', '.join(given[one] for one in asked)})"
 

@@ -230,7 +230,7 @@ class LawTable(Table):
             from hpcclear.laws.checks import check
 
             with at("law"):
-                check(law, found)
+                check(law, tuple(found.items()))
         return found
 
     def _check(self) -> None:

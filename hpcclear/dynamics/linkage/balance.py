@@ -97,10 +97,10 @@ class Balance:
             return bend.spun()
         modes = {Mover(kind, body): k for kind, k in zip(bend.kinds, bend.modes, strict=True)}
         if first in modes and first == second:
-            return bend.modal_mass
+            return bend.number("mass")  # M/2, of every mode
         for one, two in ((first, second), (second, first)):
             if one == turns and two in modes:
-                return bend.turned(modes[two])
+                return bend.number(f"turned_{modes[two]}")  # X: by how much its rate is a turning
         return ZERO
 
     def inner(self, pairs: Iterable[tuple[Term, Held, Held]], rates: tuple[Term, ...] = ()) -> Term:
@@ -252,7 +252,7 @@ class Balance:
         """Rates and vectors of 2 v w of what moves in turning frames, and of v^2 where its direction changes."""
         for move in moves:
             if move.turns_along:
-                speed = named(self.kinematics.speed_name((move.kind, move.body, "")))
+                speed = named(self.kinematics.speed_name(move.kind, move.body))
                 rates = (named("2.0"), speed, self.kinematics.spin(move.frame))
                 yield rates, (move.frame, move.direction.across())
                 if any(move.changing):

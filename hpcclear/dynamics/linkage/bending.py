@@ -52,29 +52,21 @@ class Bend:
         self.v = tuple(named(f"v{kind}_{body.name}") for kind in self.kinds)
         self._bound: Term | None = None
 
-    def _number(self, entry: str) -> Term:
+    def number(self, entry: str) -> Term:
+        """A number of the bar, as `entries` has them."""
         return self.writer.parameter(f"{self.name}_bend_{entry}")
 
     def _let(self, name: str, term: Term) -> Term:
         return self.writer.let(f"{name}_{self.name}", term)
 
-    @property
-    def modal_mass(self) -> Term:
-        """M/2, of every mode."""
-        return self._number("mass")
-
     def lateral(self, mode: int) -> Term:
         """S of a mode: first moment across; even ones have none."""
-        return self._number(f"lateral_{mode}") if mode % 2 else ZERO
-
-    def turned(self, mode: int) -> Term:
-        """X of a mode: by how much its rate is a turning."""
-        return self._number(f"turned_{mode}")
+        return self.number(f"lateral_{mode}") if mode % 2 else ZERO
 
     def _pair(self, entry: str, i: int, j: int) -> Term:
         if entry == "axial" and i != j and (i - j) % 2 == 0:
             return ZERO
-        return self._number(f"{entry}_{min(i, j)}{max(i, j)}")
+        return self.number(f"{entry}_{min(i, j)}{max(i, j)}")
 
     def _sum(
         self, factor: Callable[[int], Term], others: Sequence[Term], start: Term = ZERO
@@ -93,17 +85,17 @@ class Bend:
     # ---- places -------------------------------------------------------------------------------------
     def shortening(self) -> Term:
         """delta, m."""
-        total = self._sum(lambda k: self._number(f"nearer_{k}") * self.q[k - 1], self.q)
+        total = self._sum(lambda k: self.number(f"nearer_{k}") * self.q[k - 1], self.q)
         return self._let("shorter", _HALF * total)
 
     def nearer(self, mode: int) -> tuple[Term, Term]:
         """Derivatives of delta by an amplitude: first and second."""
-        second = self._number(f"nearer_{mode}")
+        second = self.number(f"nearer_{mode}")
         return self._let(f"nearer{mode}", second * self.q[mode - 1]), second
 
     def slope(self, mode: int, point: str) -> Term:
         """By how much the end at a point turns with an amplitude, rad/m."""
-        slope = self._number(f"slope_{mode}")
+        slope = self.number(f"slope_{mode}")
         return -slope if point == "b" and mode % 2 else slope
 
     def end_spin(self, spin: Term, point: str) -> Term:
@@ -145,7 +137,7 @@ class Bend:
     def _beyond(self) -> Term:
         """Zero as long as deflections are small, else what no step gets through."""
         if self._bound is None:
-            shorter, most = (self.writer.text(t) for t in (self.shortening(), self._number("most")))
+            shorter, most = (self.writer.text(t) for t in (self.shortening(), self.number("most")))
             self._bound = named(self.writer.fresh(f"beyond_{self.name}"))
             self.writer.line(f"{self._bound.name} = 0.0 if {shorter} < {most} else 1e300")
         return self._bound
@@ -153,12 +145,12 @@ class Bend:
     def restoring(self, mode: int, spin: Term) -> Term:
         """Force on an amplitude: what turning throws outwards, less spring and damper."""
         thrown = self._times("spun", mode) * spin * spin - self._beyond()
-        spring = self._number(f"stiffness_{mode}") * self.q[mode - 1]
-        return thrown - spring - self._number(f"damping_{mode}") * self.v[mode - 1]
+        spring = self.number(f"stiffness_{mode}") * self.q[mode - 1]
+        return thrown - spring - self.number(f"damping_{mode}") * self.v[mode - 1]
 
     def loss(self) -> Term:
         """Power that damping takes, W."""
-        return self._sum(lambda k: self._number(f"damping_{k}") * self.v[k - 1], self.v)
+        return self._sum(lambda k: self.number(f"damping_{k}") * self.v[k - 1], self.v)
 
 
 # ---- numbers --------------------------------------------------------------------------------------------

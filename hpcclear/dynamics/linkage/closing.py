@@ -101,7 +101,7 @@ class Closing:
             found = found - kin.rotated(frame, arm.times(spin, spin))
         for move in point.moves:
             if move.turns_along:
-                speed = named(kin.speed_name((move.kind, move.body, "")))
+                speed = named(kin.speed_name(move.kind, move.body))
                 rate = named("2.0") * speed * kin.spin(move.frame)
                 found = found + kin.rotated(move.frame, move.direction.times(rate).across())
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))

@@ -7,6 +7,7 @@ contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 from hpcclear.base.terms import NOWHERE, ZERO, Term, Vector, named
@@ -221,23 +222,19 @@ class _Generator(MotionEquations):
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 
-    def _second(self, found: dict[int, Term]) -> Callable[[Mover], Term]:
-        """Accelerations of coordinates, by their columns; 0 of what is none."""
-
-        def second(column: Mover) -> Term:
-            term = found[self.number[column]] if column in self.number else ZERO
-            if column.kind == "y" and column.body in self.balance.falling:
-                return term - self.writer.parameter("gravity")
-            return term
-
-        return second
+    def _second(self, found: dict[int, Term], column: Mover) -> Term:
+        """Acceleration of a coordinate, by its column; 0 of what is none."""
+        term = found[self.number[column]] if column in self.number else ZERO
+        if column.kind == "y" and column.body in self.balance.falling:
+            return term - self.writer.parameter("gravity")
+        return term
 
     def _shaking(self, found: dict[int, Term]) -> None:
         """Force of the mechanism on its frame, weight included, of rigid bodies only.
 
         Loads act between bodies and the frame, so that of all forces inertia and weight are left.
         """
-        kin, write, second = self.kinematics, self.writer, self._second(found)
+        kin, write, second = self.kinematics, self.writer, partial(self._second, found)
         total = NOWHERE
         for body in self.mechanism.bodies:
             moved = kin.acceleration(kin.center(body.name), second)
@@ -251,7 +248,7 @@ class _Generator(MotionEquations):
 
     def _follow(self, found: dict[int, Term]) -> None:
         """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
-        second = self._second(found)
+        second = partial(self._second, found)
         kin, follow = self.kinematics, self.on.follow
         if "." not in follow:
             if (k := self.number.get(Mover("slide", follow))) is not None:

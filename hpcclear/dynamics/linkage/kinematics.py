@@ -57,7 +57,7 @@ class Kinematics:
         self._accelerations: dict[str, Term] = {}
         for k, one in enumerate(forest.coordinates):
             writer.when_needed(f"work[{rows.coordinates + k} * W + i]", one.name)
-            writer.when_needed(f"work[{rows.velocities + k} * W + i]", self.speed_name(one))
+            writer.when_needed(f"work[{rows.velocities + k} * W + i]", self.speed_name(*one))
         writer.when_needed(f"work[{rows.time} * W + i]", "time")
         for frame in dict.fromkeys(forest.frames.values()):
             if frame != GROUND:
@@ -66,9 +66,8 @@ class Kinematics:
         self.bends = {body.name: Bend(body, writer) for body in bending}
 
     @staticmethod
-    def speed_name(coordinate: tuple[str, str, str]) -> str:
+    def speed_name(kind: str, body: str) -> str:
         """Name of a coordinate's velocity."""
-        kind, body, _ = coordinate
         return f"spin_{body}" if kind == "angle" else f"v{kind}_{body}"
 
     # ---- frames ---------------------------------------------------------------------------------
@@ -249,7 +248,7 @@ class Kinematics:
     def _moving(self, point: Point, frame: str) -> list[tuple[Move, Term]]:
         """Moves of a point in a frame, and their speeds."""
         moves = [move for move in point.moves if move.frame == frame and move.kind != "across"]
-        return [(one, named(self.speed_name((one.kind, one.body, "")))) for one in moves]
+        return [(one, named(self.speed_name(one.kind, one.body))) for one in moves]
 
     def velocity(self, point: Point) -> Vector:
         """How fast it moves."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.terms import ZERO, Term, named
+from hpcclear.base.terms import ZERO, named
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Rows, Writer
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
@@ -43,7 +43,8 @@ class Poses:
             for r, term in enumerate((*kin.position(centre), *kin.velocity(centre))):
                 lines.append(f"out[{6 * k + r}] = {writer.text(term)}")
             frame = forest.frames[body.name]
-            lines.append(f"out[{6 * k + 4}] = {writer.text(_angle(kin, frame))}")
+            angle = ZERO if frame == GROUND else named(f"angle_{frame}")
+            lines.append(f"out[{6 * k + 4}] = {writer.text(angle)}")
             lines.append(f"out[{6 * k + 5}] = {writer.text(kin.spin(frame))}")
         first = 6 * len(forest.mechanism.bodies)
         for k, contact in enumerate(forest.mechanism.contacts):
@@ -84,11 +85,3 @@ class Poses:
         offsets = np.array([self.forest.offsets[body.name] for body in bodies])
         eccentricity = rows[6 * len(bodies) :].reshape(-1, 2, count)
         return Pose(x, y, angle + offsets[:, None], vx, vy, spin), eccentricity
-
-
-def _angle(kin: Kinematics, frame: str) -> Term:
-    """Angle of a frame; of one that a drive prescribes, what it is made from is written down first."""
-    if frame == GROUND:
-        return ZERO
-    drive = kin.forest.prescribed.get(frame)
-    return named(f"angle_{frame}") if drive is None else kin.driven(drive, frame)[0]

@@ -18,8 +18,6 @@ LONG = 200
 """Lines of a text from which half of its vectors stand batched: of all of them there are more instructions than the
 processor keeps decoded."""
 
-KINDS = (DOUBLES, DOUBLES)
-
 
 @cache  # a study requires it with every lane's compilation, some hundred times
 def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Compiled:
@@ -43,7 +41,7 @@ def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Compiled
     """
     long = inspect.getsource(module.lane.py_func).count("\n") > LONG
     with interleaved(W // 2 if long and W == BANK else W):
-        return Compiled(module.motion, KINDS, FASTMATH, effects=effects, W=W)
+        return Compiled(module.motion, (DOUBLES, DOUBLES), FASTMATH, effects=effects, W=W)
 
 
 @lane_function

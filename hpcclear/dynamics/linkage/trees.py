@@ -21,7 +21,6 @@ class Coordinate(NamedTuple):
 
     kind: str
     body: str
-    joint: str = ""
 
     @property
     def name(self) -> str:
@@ -154,6 +153,6 @@ def _coordinates(
         if frames[body.name] == body.name and body.name not in prescribed:
             found.append(Coordinate("angle", body.name))
         if joint is not None and joint.kind == "slide":
-            found.append(Coordinate("slide", body.name, joint.name))
+            found.append(Coordinate("slide", body.name))
     main = Coordinate("angle", frames[m.period.body])
     return (*(c for c in found if c != main), *(c for c in found if c == main))

@@ -78,7 +78,7 @@ def _given(get: Numbers, kind: str, table: Any) -> dict[str, object]:
     """A law's parameters of samples, (m,); lists as they are."""
     values = {one.name: table.value(one.name) for one in table.declared.parameters}
     return {
-        name: tuple(value) if isinstance(value, tuple) else get(f"effects.{kind}.{name}")
+        name: value if isinstance(value, tuple) else get(f"effects.{kind}.{name}")
         for name, value in values.items()
     }
 
@@ -94,10 +94,9 @@ def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None
     p[:, at.JOURNAL_RADIUS] = shape.journal_radius
     table: Any = scene.effects.contact
     law = with_constants(table.declared)
-    given = {**joint, **_given(get, "contact", table)}
-    rows = numbers.rows_of(law, given, len(p))
+    found = numbers.sample_numbers(law, {**joint, **_given(get, "contact", table)})
+    rows = numbers.rows_of(law, found, len(p))
     p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
-    found = numbers.sample_numbers(law, given)
     p[:, at.EXPONENT], p[:, at.DAMPING] = numbers.shape_near(law, force, found)
     if law.deepest is None:
         ratio = joint["journal_radius"] / joint["bearing_radius"]
@@ -109,13 +108,11 @@ def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None
     rubs = scene.effects.friction
     if rubs.law == "none":
         return
-    given = {**joint, **_given(get, "friction", rubs)}
     friction = with_constants(rubs.declared)
-    rows = numbers.rows_of(friction, given, len(p))
+    found = numbers.sample_numbers(friction, {**joint, **_given(get, "friction", rubs)})
+    rows = numbers.rows_of(friction, found, len(p))
     p[:, at.FRICTION_NUMBERS : at.FRICTION_NUMBERS + rows.shape[1]] = rows
-    found = numbers.sample_numbers(friction, given)
-    ramp, slope = numbers.steepness_of(friction, found, len(p))
-    p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = ramp, slope
+    p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = numbers.steepness_of(friction, found, len(p))
 
 
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:

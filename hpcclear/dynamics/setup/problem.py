@@ -21,10 +21,7 @@ from hpcclear.scene.driving import PlanarRunUp, PlanarTable
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-STIFF_RAMP = STEEP
-"""Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
-
-STIFF_DAMPING = 10.0  # fixed damping factor in s/m, or coefficient of a law with restitution, from which it does
+STIFF_DAMPING = 10.0  # damping factor in s/m, or coefficient of a law with restitution, from which "auto" is implicit
 
 
 def coordinate_count(scene: Scene) -> int:
@@ -92,7 +89,7 @@ def implicit_method(scene: Scene) -> str:
     par = Parameters(parameters(scene)[0])
     there = list(at.places_of(effects_of(scene)))
     ramp = par.steepness * (scene.effects.friction.law != "none")
-    stiff = (ramp >= STIFF_RAMP) | (par.damping >= STIFF_DAMPING)
+    stiff = (ramp >= STEEP) | (par.damping >= STIFF_DAMPING)
     return "stiff" if stiff[there].any() else "never"
 
 

@@ -33,10 +33,6 @@ class PrescribedSamples:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
         labels, par, starts = map(np.concatenate, zip(*self._queued, strict=True))
         self._queued = [self._none]
-        return labels, self.run(par, Start(starts)), par
-
-    def run(self, par: Array, start: Start) -> Outcome:
-        """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""
         rows, problem = np.zeros((len(par), Outcome.size)), self._problem
         revolutions = problem.transient + problem.averaged
         rows[:, Outcome.spread] = 0.0 if problem.averaged > 1 else np.nan
@@ -46,4 +42,4 @@ class PrescribedSamples:
         rows[:, works : works + 4] = np.nan  # no gap, contact or work, which only a response has
         held = slice(Outcome.peak_moment, Outcome.peak_acceleration + 1)
         rows[:, held] = par[:, at.HELD_MOMENT : at.HELD_PEAK + 1]
-        return problem.marked(Outcome(rows), par, start)
+        return labels, problem.marked(Outcome(rows), par, Start(starts)), par

@@ -83,12 +83,9 @@ def profiles(places, bearing, journal, lanes, tables, W):
         add_surface(work, p, at.ANGLES + 4 * p + 2, first + 2 * bearing, journal, W)
 
 
-_KINDS = (DOUBLES, DOUBLES)
-
-
 @cache
 def profile_code(effects: at.Effects, W: int) -> Compiled:
     """The compiled `profiles` of these effects for W lanes; its ``address`` is what steppers take, as that of a motion."""
     places = tuple(at.places_of(effects))
     counts = {"bearing": effects.bearing_waves or 0, "journal": effects.journal_waves or 0}
-    return Compiled(profiles, _KINDS, FASTMATH, places=places, W=W, **counts)
+    return Compiled(profiles, (DOUBLES, DOUBLES), FASTMATH, places=places, W=W, **counts)

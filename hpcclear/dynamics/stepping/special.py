@@ -80,13 +80,10 @@ def special(
     answer(of, rules_in(of), block, queue, entries, carray(tables, at.MAX_CURVES))
 
 
-_KINDS = (COUNTS, *[DOUBLES] * 9, *[COUNTS] * 2)
-
-
 @cache
 def special_code() -> Compiled:
     """The compiled `special`; its ``address`` is what steppers take."""
-    return Compiled(special, _KINDS, FASTMATH)
+    return Compiled(special, (COUNTS, *[DOUBLES] * 9, *[COUNTS] * 2), FASTMATH)
 
 
 @lane_function

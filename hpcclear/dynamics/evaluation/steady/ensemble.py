@@ -71,10 +71,6 @@ class _Copies:
     strictness: Array
     outcomes: list[Outcome] = field(default_factory=list)
 
-    def gaps(self) -> Array:
-        """Shape (segments, copies, 2)."""
-        return np.stack([outcome.mean_gap for outcome in self.outcomes])
-
     def kept(self, seen: "_Interval") -> Outcome:
         rows = np.stack([outcome.rows for outcome in self.outcomes[seen.first :]])
         return Outcome(rows if seen.pooled else rows[:, 1::2])
@@ -241,7 +237,7 @@ def _join(copies: _Copies, new: _Copies) -> None:
 
 def _interval(copies: _Copies, sample: Sample) -> _Interval:
     speeds = sample.speeds(copies.outcomes)
-    gaps = copies.gaps()
+    gaps = np.stack([outcome.mean_gap for outcome in copies.outcomes])
     y = judging.projected(gaps)  # (segments, copies)
     total = len(y)
     between = y.var(axis=1, ddof=1)

@@ -57,9 +57,6 @@ class _History:
         rows = np.stack([outcome.rows for outcome in self.outcomes[-revolutions:]])
         return Outcome(rows[:, 2:])
 
-    def gaps(self) -> Array:
-        return np.stack([outcome.mean_gap for outcome in self.outcomes])
-
 
 def _is_checkpoint(revolutions: int) -> bool:
     last = CHECKPOINTS[-1]
@@ -70,8 +67,7 @@ def _is_checkpoint(revolutions: int) -> bool:
 def _growth(apart: list[float]) -> float:
     """Lyapunov exponent per revolution, until copies are as far apart as at the end."""
     distance = np.array(apart)
-    lasting = np.median(distance[len(distance) // 2 :])
-    far = int(np.argmax(distance >= 0.3 * lasting)) or len(distance) - 1
+    far = judging.parted(distance) or len(distance) - 1
     with np.errstate(divide="ignore"):
         return float(np.log(distance[far] / distance[0]) / far)
 
@@ -110,7 +106,7 @@ def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mea
 def _judge(history: _History, sample: Sample, target: float, rtol: float) -> dict[str, Any] | str:
     """What a look shows at a checkpoint: what is known of a regular motion's `Mean`, or what to do next ("tighten",
     "irregular")."""
-    gaps = history.gaps()
+    gaps = np.stack([outcome.mean_gap for outcome in history.outcomes])
     revolutions = len(gaps)
     level = target * float(objective(gaps[-1, 2:]).mean())
     # of the stricter copies: the others only test the tolerance

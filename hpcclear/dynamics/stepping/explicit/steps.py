@@ -213,10 +213,7 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
     take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 
 
-_KINDS = (COUNTS, *[DOUBLES] * 4, COUNTS)
-
-
 @cache
 def explicit_code(W: int, stages: int) -> Compiled:
     """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
-    return Compiled(explicit_steps, _KINDS, FASTMATH, W=W, stages=stages)
+    return Compiled(explicit_steps, (COUNTS, *[DOUBLES] * 4, COUNTS), FASTMATH, W=W, stages=stages)

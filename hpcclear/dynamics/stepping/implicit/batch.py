@@ -280,13 +280,10 @@ def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
             eight_steps(effects, moved, W, block, eights[e], carray(settings, RunSettings.size))
 
 
-_KINDS = (COUNTS, *[DOUBLES] * 5, COUNTS, DOUBLES)
-
-
 @cache
 def batch_code() -> Compiled:
     """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
-    return Compiled(batch_steps, _KINDS, FASTMATH)
+    return Compiled(batch_steps, (COUNTS, *[DOUBLES] * 5, COUNTS, DOUBLES), FASTMATH)
 
 
 @lane_function
