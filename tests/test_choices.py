@@ -11,7 +11,7 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.cases import Goal
 from hpcclear.scene.domain import box
 from hpcclear.scene.fits import fit_of
-from hpcclear.scene.points import Points, expanded, latin_hypercube, nearest_of, snapped
+from hpcclear.scene.points import Points, expanded, latin_hypercube, snapped
 from hpcclear.scene.sampling import monte_carlo
 
 JOB = tomllib.loads(
@@ -60,9 +60,9 @@ def test_lists_and_grids_are_sampled_evenly(row, options):
         found, counts = np.unique(points.column("m3"), return_counts=True)
         assert found == pytest.approx(options)
         assert np.ptp(counts) <= 1
-    near = nearest_of(scene.study.variable("m3").options, np.array([0.0, 0.119, 9.0]))
+    near = snapped(scene.study, ("m3",), np.array([[0.0], [0.119], [9.0]]))[:, 0]
     assert set(near) <= set(scene.study.variable("m3").options)
-    assert near[0], near[-1] == (options[0], options[-1])
+    assert (near[0], near[-1]) == pytest.approx((options[0], options[-1]))
 
 
 def test_what_scatters_about_a_value_is_modelled_between_values():

@@ -13,7 +13,7 @@ from test_own_objectives import GOALS
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
-from hpcclear.cli.options import noted
+from hpcclear.cli.options import Written, loaded
 from hpcclear.ensemble.identity import run_key
 from hpcclear.plugins import Registry, run_source, trusting, using
 from hpcclear.scene import load_scene
@@ -179,7 +179,7 @@ def test_commands_name_the_file_that_a_scene_runs(tmp_path, capsys):
     code, output = warm_command("check", path, "--no-cost")
     assert code == 0, output
     assert note in " ".join(output.split())
-    noted(load_scene(path))  # what the commands that simulate do with a scene
+    loaded(Written(path, ()))  # what the commands that simulate do with a scene
     assert note in capsys.readouterr().err
     code, output = warm_command("check", QUICKSTART, "--no-cost")
     assert "Python code" not in output

@@ -142,10 +142,6 @@ class Field(NamedTuple):
         return self.of(outcome) if callable(self.of) else getattr(outcome, str(self.of))
 
 
-def _about_mean(o: Any) -> Any:
-    return np.sqrt(np.maximum(o.square_frame_force - (o.frame_force**2).sum(axis=1), 0.0))
-
-
 _IMPACTS = {
     "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact",
         goal="number of impacts in a revolution",
@@ -164,7 +160,7 @@ _IMPACTS = {
         of=lambda o: np.sqrt(np.maximum(o.square_force, 0.0))),
     "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact",
         goal="root mean square about its mean of the force on the frame",
-        of=_about_mean),
+        of=lambda o: np.sqrt(np.maximum(o.square_frame_force - (o.frame_force**2).sum(axis=1), 0.0))),
 }  # fmt: skip
 """Measures of impact and noise; angles without contact go by time."""
 

@@ -20,15 +20,6 @@ TAIL = 6.0
 """A normal input counts up to this many standard deviations: 2e-9 of it lies beyond, and is clipped."""
 
 
-def truncated_quantile(chance: Array, low: float, high: float) -> Array:
-    """Quantiles, of any shape, of the standard normal truncated at low < 0 < high, all in standard deviations."""
-    from scipy.special import ndtr, ndtri  # a quarter of a second that a Latin hypercube saves
-
-    below = ndtr(low)
-    share = 1 - (below + ndtr(-high))
-    return np.clip(ndtri(below + share * chance), low, high)
-
-
 class Quantiles(Protocol):
     """A distribution of a number or of its offset."""
 
@@ -77,12 +68,14 @@ class Normal:
 
     def __call__(self, chance: Array) -> Array:
         """Quantiles, of any shape."""
-        if self.reach == inf:
-            from scipy.special import ndtri  # a quarter of a second, which "lhs" does not need
+        from scipy.special import ndtr, ndtri  # a quarter of a second, which "lhs" does not need
 
+        if self.reach == inf:
             return np.asarray(self.middle + self.deviation * np.clip(ndtri(chance), -TAIL, TAIL))
         cut = self.reach / self.deviation
-        return self.middle + self.deviation * truncated_quantile(chance, -cut, cut)
+        below = ndtr(-cut)
+        normal = np.clip(ndtri(below + (1 - 2 * below) * chance), -cut, cut)
+        return np.asarray(self.middle + self.deviation * normal)
 
 
 @dataclass(frozen=True)

@@ -104,11 +104,13 @@ class Written(NamedTuple):
     overrides: tuple[str, ...]
 
 
-def noted(scene: "Scene") -> "Scene":
-    """Return the scene, after printing the Python files that it runs, readings of units and likely slips of units."""
+def loaded(written: Written) -> "Scene":
+    """Return the scene of a command, after printing the Python files that it runs, readings of units and likely slips of units."""
+    from hpcclear.scene import load_scene
     from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
 
+    scene = load_scene(*written)
     for text in (*files_run(scene.plugins), *map(str, scene.readings)):
         say(f"Note: {text}")
     for text in implausible(scene):

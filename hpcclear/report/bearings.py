@@ -128,8 +128,8 @@ def remarks(response: Results) -> list[tuple[str, str]]:
     found += [("Warning", text) for text in _gaining(response)]
     found += [("Warning", text) for text in str(response.attrs.get("cautions", "")).splitlines()]
     flags = int(response["flags"])
-    found += [("Warning", text) for text in flag_remarks(flags & sum(WARNED))]
-    return [*found, *(("Note", text) for text in flag_remarks(flags & int(Flag.STIFF)))]
+    kinds = [*(("Warning", flag) for flag in WARNED), ("Note", Flag.STIFF)]
+    return [*found, *((label, REMARKS[flag]) for label, flag in kinds if flags & flag)]
 
 
 def _gaining(response: Results) -> list[str]:
@@ -180,11 +180,6 @@ def sensitive_words(relative: float, content: Results) -> str:
         remedy = "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
     half_width = f"From replicas with other starts its half-width is {100 * relative:.0f} % of f"
     return f"f is sensitive to initial conditions or to the tolerance. {half_width}. {remedy}"
-
-
-def flag_remarks(flags: int) -> list[str]:
-    """Return a sentence for each flag that is set."""
-    return [text for flag, text in REMARKS.items() if flags & flag]
 
 
 def averaged(response: Results) -> Booleans:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
+Curve = Callable[[Array], Array]
+"""Values of a series at places (n,) along the axis."""
+
 SHIFTS = 720
 """Shifts of a revolution that are tried for the largest correlation; the best is refined between its neighbours."""
 
@@ -163,12 +166,7 @@ def compare(
 
 
 def _aligned(
-    how: str,
-    at: Array,
-    simulated: list[Callable[[Array], Array]],
-    measured: list[Array],
-    span: float,
-    turns: int,
+    how: str, at: Array, simulated: list[Curve], measured: list[Array], span: float, turns: int
 ) -> tuple[float, str]:
     """What to add to the measured places `at` (n,), and how that was found, in words."""
     if how == "angle":
@@ -177,7 +175,9 @@ def _aligned(
         return _best(at, simulated, measured, steps), "by crank angle"
     if how == "correlation" and any(map(np.ptp, measured)):  # else all shifts are alike
         shifts = np.linspace(0, span, SHIFTS * turns, endpoint=False)
-        return _best(at, simulated, measured, shifts, refine=True), "by the largest correlation"
+        best = _best(at, simulated, measured, shifts)
+        fine = shifts[1] * np.linspace(-1.0, 1.0, 41)  # between its neighbours
+        return _best(at, simulated, measured, best + fine), "by the largest correlation"
     return 0.0, NOT_ALIGNED
 
 
@@ -260,13 +260,7 @@ def _curve(place: Array, signal: Signal) -> Callable[[Array], Array]:
     return lambda at: np.diff(since(at), prepend=since(at[:1]))
 
 
-def _best(
-    at: Array,
-    simulated: list[Callable[[Array], Array]],
-    measured: list[Array],
-    shifts: Array,
-    refine: bool = False,
-) -> float:
+def _best(at: Array, simulated: list[Curve], measured: list[Array], shifts: Array) -> float:
     """The shift with the largest sum of correlation coefficients."""
     few = np.unique(np.linspace(0, len(at) - 1, min(len(at), MOST_POINTS)).astype(int))
 
@@ -274,11 +268,7 @@ def _best(
         pairs = zip(simulated, measured, strict=True)
         return sum(_correlation(curve(at[few] + shift), own[few]) for curve, own in pairs)
 
-    best = float(max(shifts, key=agreement)) if len(shifts) > 1 else float(shifts[0])
-    if refine and len(shifts) > 1:
-        step = float(shifts[1] - shifts[0])
-        best = float(max(best + step * np.linspace(-1.0, 1.0, 41), key=agreement))
-    return best
+    return float(max(shifts, key=agreement)) if len(shifts) > 1 else float(shifts[0])
 
 
 def _correlation(first: Array, second: Array) -> float:

@@ -85,11 +85,9 @@ def dataset(
     return Results(variables, {**fixed, **(attributes or {})})
 
 
-Sizes = Mapping[str, int]
-"""Of dimensions."""
-
-
-def _variable(name: str, row: FileVariable, values: ArrayLike, sizes: Sizes) -> Variable:
+def _variable(
+    name: str, row: FileVariable, values: ArrayLike, sizes: Mapping[str, int]
+) -> Variable:
     listed = row.dtype == "text" and not isinstance(values, np.ndarray)
     array = np.array(values, str) if listed else np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
@@ -292,10 +290,7 @@ def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str
             target.attrs[str(name)] = np.atleast_1d(np.asarray(value))
 
 
-FilePath = str | os.PathLike[str]
-
-
-def read(path: FilePath, kind: str | None = None, scene_hash: str | None = None) -> Results:
+def read(path: str | Path, kind: str | None = None, scene_hash: str | None = None) -> Results:
     """Read a result file into memory and check it against the table; of a kind and made from a scene, if these are given.
 
     Raises InputError: the file is missing, cut off, changed, foreign, of another kind or scene, or says what cannot be.

@@ -64,13 +64,6 @@ _FIT = re.compile(
 _EXAMPLE = 'Write size, hole and shaft as in "20 H7/f7"'
 
 
-class SizeLimits(NamedTuple):
-    """Smallest and largest diameter of a part, or clearance, m."""
-
-    least: float
-    most: float
-
-
 class Fit(NamedTuple):
     """A hole and a shaft of one nominal size."""
 
@@ -81,16 +74,16 @@ class Fit(NamedTuple):
     shaft: tuple[float, float]
     """The same."""
 
-    def diameters(self, part: str) -> SizeLimits:
+    def diameters(self, part: str) -> tolerances.Limits:
         """Smallest and largest diameter of "hole" or "shaft", m."""
         low, high = getattr(self, part)
-        return SizeLimits((1e3 * self.size + low) / 1e6, (1e3 * self.size + high) / 1e6)
+        return (1e3 * self.size + low) / 1e6, (1e3 * self.size + high) / 1e6
 
     @property
-    def clearances(self) -> SizeLimits:
+    def clearances(self) -> tolerances.Limits:
         """Least and largest radial clearance, m; below 0 where both may be tight."""
         (low, high), (least, most) = self.hole, self.shaft
-        return SizeLimits((low - most) / 2e6, (high - least) / 2e6)
+        return (low - most) / 2e6, (high - least) / 2e6
 
     @property
     def clearance(self) -> float:
@@ -194,7 +187,7 @@ class Tolerance(Table):
             reason = "the mean lies off the middle, and nothing says where"
             raise invalid(reason, 'Add towards = "upper" or "lower"', "towards")
 
-    def part(self, limits: SizeLimits | None) -> tolerances.PartSize:
+    def part(self, limits: tolerances.Limits | None) -> tolerances.PartSize:
         """Its distribution; `limits` are those of the fit."""
         given = self.range or limits
         assert given is not None  # by validation

@@ -221,16 +221,11 @@ def _with_model(table: str, name: str, rows: Mapping[str, object]) -> object:
 
 
 def turns_of(planar: Planar) -> int:
-    """Turns of the driven body in a revolution."""
-    return main_drive(planar).turns
-
-
-def main_drive(planar: Planar) -> PlanarDrive:
-    """The drive that gives the period; raises InputError if there is none."""
+    """Turns, in a revolution, of the body whose drive gives the period; raises InputError if nothing is driven."""
     if not planar.drives:
         raise InputError(
             "mechanism.drives", None, "nothing drives the mechanism",
             'Add [mechanism.drives.NAME] with a kind, say "constant-speed", and a body. For a mechanism that is let go: '
             'kind = "free", a body, and interval = "1 s", which replaces the revolution',
         )  # fmt: skip
-    return next((drive for drive in planar.drives if drive.period), planar.drives[0])
+    return next((drive for drive in planar.drives if drive.period), planar.drives[0]).turns

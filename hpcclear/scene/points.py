@@ -112,14 +112,10 @@ def snapped(study: Study, names: Sequence[str], coordinates: Array, model: bool 
     for column, name in enumerate(names):
         options = study.variable(name).options
         if options is not None and name not in about:
-            found[:, column] = nearest_of(options, found[:, column])
+            table = np.asarray(options)
+            places = np.searchsorted((table[1:] + table[:-1]) / 2.0, found[:, column])
+            found[:, column] = table[places]
     return found
-
-
-def nearest_of(options: Sequence[float], values: Array) -> Array:
-    """The nearest of some rising numbers, SI, (n,)."""
-    table = np.asarray(options)
-    return np.asarray(table[np.searchsorted((table[1:] + table[:-1]) / 2.0, values)])
 
 
 def expanded(study: Study | None, points: Points) -> Points:

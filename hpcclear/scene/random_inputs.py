@@ -96,11 +96,6 @@ for _name, _form in OURS.items():
     DISTRIBUTIONS.add(_name, _form)
 
 
-def is_ours(name: object) -> bool:
-    """Whether a distribution is one of ours, or none at all; others have parameters of their own."""
-    return not isinstance(name, str) or name in OURS
-
-
 def form_of(name: str, parameters: Mapping[str, float]) -> Form:
     """Return the requirements of a distribution; raise an error for validators if the name is not known."""
     if name in OURS:
@@ -114,17 +109,6 @@ def form_of(name: str, parameters: Mapping[str, float]) -> Form:
             factory = DISTRIBUTIONS.get(name)
         law = partial(_of_plugin, name, factory, parameters)
     return Form(law, may_have=OF_LIMITS | {"parameters"})
-
-
-def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[str, float]:
-    """Parameters of a distribution from elsewhere as numbers: texts in the unit of its input, scipy's shapes in none."""
-    found = {}
-    for key, value in parameters.items():
-        bare = name.startswith(f"{SCIPY}:") and key not in ("loc", "scale")
-        with at(str(key), value):
-            own = Quantity("" if bare or not isinstance(value, str) else unit)
-            found[str(key)] = own.number(value)
-    return found
 
 
 def _check_scipy(own: str) -> None:
@@ -248,8 +232,9 @@ class RandomInput(NamedInput):
         """The row with its paths, and numbers in the unit of these."""
         row, paths = with_paths(row)
         quantity = quantities()[paths[0]]
-        if not is_ours(row.get("distribution")):
-            form_of(row["distribution"], {})  # refuses an unknown one first
+        named = row.get("distribution")
+        if isinstance(named, str) and named not in OURS:  # which has parameters of its own
+            form_of(named, {})  # refuses an unknown one first
             row = _gathered(row, quantity.unit)
         offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
@@ -342,7 +327,8 @@ class RandomInput(NamedInput):
 
 
 def _gathered(row: Content, unit: str) -> Content:
-    """The row of a distribution from elsewhere, its own parameters in one table."""
+    """The row of a distribution from elsewhere, its own parameters as numbers in one table: texts in the unit of its input,
+    scipy's shapes in none."""
     if "parameters" in row:
         own, kept = row["parameters"], row
         if not isinstance(own, Mapping):
@@ -351,4 +337,10 @@ def _gathered(row: Content, unit: str) -> Content:
         rest = {*_COMMON, *OF_LIMITS}
         own = {key: value for key, value in row.items() if key not in rest}
         kept = {key: value for key, value in row.items() if key in rest}
-    return {**kept, "parameters": converted(row["distribution"], own, unit)}
+    found = {}
+    for key, value in own.items():
+        bare = row["distribution"].startswith(f"{SCIPY}:") and key not in ("loc", "scale")
+        with at(str(key), value):
+            quantity = Quantity("" if bare or not isinstance(value, str) else unit)
+            found[str(key)] = quantity.number(value)
+    return {**kept, "parameters": found}

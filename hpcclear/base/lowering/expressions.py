@@ -104,15 +104,11 @@ class Expressions(Arithmetic):
         if not val.is_known(test) and all(isinstance(one, _AT_HAND) for one in ways):
             chosen = [self.expression(one) for one in ways]
             if all(isinstance(one, float | int | ir.Value) for one in chosen):
-                return self.selected(test, *chosen)
+                # into a branch the compiler may move their loads, and vectorises no loop around it
+                one, other, _ = self.both(*chosen)
+                return self.builder.select(test, one, other)
         yes, no = (partial(self.expression, one) for one in ways)
         return self.either(test, yes, no)
-
-    def selected(self, test: Value, yes: Value, no: Value) -> Value:
-        """One of two numbers at hand. Into a branch the compiler may move their loads, and vectorises no loop around it."""
-        yes, no = self.value(yes), self.value(no)
-        kind = val.wider(yes.type, no.type)
-        return self.builder.select(test, self.cast(yes, kind), self.cast(no, kind))
 
     def either(self, test: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """The value of one of two branches; of the one that is taken, where that is known."""

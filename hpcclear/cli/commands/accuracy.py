@@ -59,9 +59,7 @@ def _measure(
     written: cli.Written, output: Path, quick: bool, fresh: bool, time_limit: float | None
 ) -> None:
     with cli.on_ranks(time_limit) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.printing import describe
@@ -80,9 +78,7 @@ def _measure(
 
 def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:
     with cli.on_ranks(resumes=False) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.accuracy.plan import Plan, ladder, measure
         from hpcclear.cli.plan import describe, preview
         from hpcclear.ranks.terminal import announce

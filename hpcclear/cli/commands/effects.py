@@ -43,9 +43,7 @@ def run(
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted

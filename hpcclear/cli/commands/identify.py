@@ -58,9 +58,7 @@ def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> in
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings

@@ -58,9 +58,7 @@ def run(
     observing = ("name", "section", "transient", "revolutions")
     cli.check_mode("--bifurcation", bifurcation, ("y",), observing)
     with cli.on_ranks(how.time_limit) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
         from hpcclear.ensemble.maps import number_of, run_map

@@ -21,9 +21,7 @@ def run(
     """
 
     with cli.on_ranks(time_limit, cli.STUDYING) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe
         from hpcclear.report.html.content import read
         from hpcclear.study import run_study

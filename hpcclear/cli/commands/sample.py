@@ -53,9 +53,7 @@ def run(
         return _merge(written, output, points) if cli.is_root() else None
     with cli.on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.session import run_sample
         from hpcclear.ensemble.split import Part
@@ -77,9 +75,7 @@ def run(
 
 
 def _merge(written: cli.Written, output: Path, points: Path | None) -> None:
-    from hpcclear.scene import load_scene
-
-    scene = cli.noted(load_scene(*written))
+    scene = cli.loaded(written)
     from hpcclear.cli.printing import describe_run
     from hpcclear.ensemble.session import design, run_merge
     from hpcclear.ranks.boundary import alone

@@ -24,9 +24,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     if keep is not None:
         overrides = (*written.overrides, f"output.keep_revolutions={keep}")
         written = written._replace(overrides=overrides)
-    from hpcclear.scene import load_scene
-
-    scene = cli.noted(load_scene(*written))
+    scene = cli.loaded(written)
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics import sizing

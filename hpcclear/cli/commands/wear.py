@@ -21,9 +21,7 @@ def run(written: cli.Written, output: Path, how: cli.How) -> int:
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        from hpcclear.scene import load_scene
-
-        scene = cli.noted(load_scene(*written))
+        scene = cli.loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.wear import run_wear
         from hpcclear.report.screens.lives import followed

@@ -98,16 +98,12 @@ def tables_figure(response: Results) -> "style.Figure":
 
 
 def draw(
-    figure: "style.Figure",
-    curves: list[Tabulated],
-    top: float,
-    height: float,
-    across: tuple[float, float] = (0.0, 1.0),
+    figure: "style.Figure", curves: list[Tabulated], height: float, across: tuple[float, float]
 ) -> None:
-    """Draw curves below one another from `top` down, each `height` high; `across`: left end and width; shares of the figure."""
+    """Draw curves below one another, each `height` high; `across`: left end and width; shares of the figure."""
     left, width = across
     for number, curve in enumerate(curves):
-        bottom = top - (number + 1) * height
+        bottom = 1.0 - (number + 1) * height
         corner = left + 0.17 * width, bottom + 0.42 * height
         _curve(figure.add_axes((*corner, 0.79 * width, 0.42 * height)), curve)
 

@@ -41,18 +41,13 @@ class Saving(NamedTuple):
     """Rounds that it was measured in; 0: it is estimated from evaluations."""
 
     @property
-    def significant(self) -> bool:
-        """Whether it is not zero as far as was measured; of an estimate whether it is a per cent at least."""
-        return abs(self.share) > (self.half if np.isfinite(self.half) else 0.005)
-
-    @property
     def words(self) -> str:
         """The share with its half-width."""
         if not np.isfinite(self.half):
             return f"about {100 * self.share:.0f} %" + ("" if self.rounds else ", by evaluations")
         share, _, half = labels.paired(100 * abs(self.share), 100 * self.half).partition(" ± ")
         sign = "-" if self.share < 0.0 and float(share) else ""
-        if not self.significant:
+        if abs(self.share) <= self.half:  # zero as far as was measured
             return f"none significant ({sign}{share} % ± {half} %)"
         return f"none, it takes {share} % ± {half} % longer" if sign else f"{share} % ± {half} %"
 

@@ -73,8 +73,9 @@ class Lettering:
         self._mark(_sampled(self.paper([first, last])))
 
     def crowding(self, start: Array, end: Array) -> int:
-        """How many samples of the way between two places have a line near them."""
-        return self._near(_sampled(self.paper([start, end])))
+        """How many samples of the way between two places have a line within 2 points."""
+        way = _sampled(self.paper([start, end]))
+        return int((self._covered(np.hstack([way - 2.0, way + 2.0])) > 0.0).sum())
 
     def word(self, places: ArrayLike, text: str, colour: str, clear: float = 0.0) -> None:
         """Write a word beside one of its places (n, 2) or (2,), at least `clear` points away; a line leads to a distant one."""
@@ -109,7 +110,7 @@ class Lettering:
             shares = (0.5, 0.35, 0.65) if room else (1.0 + beyond / length, -beyond / length)
             middles = np.array([on_paper[0] + s * (on_paper[1] - on_paper[0]) for s in shares])
             cost = self._cost(middles, size) + 4.0 * k
-            cost += 2.0 * self._near(_sampled(on_paper))
+            cost += 2.0 * self.crowding(*feet)
             at = _sampled(on_paper)[:, None]
             crossed = (at > self._boxes[:, :2]) & (at < self._boxes[:, 2:])
             cost += 1e4 * bool(crossed.all(axis=2).any())
@@ -170,10 +171,6 @@ class Lettering:
         x0, y0, x1, y1 = np.clip(np.rint(boxes).astype(int), 0, ends).T
         found: Array = total[x1, y1] - total[x0, y1] - total[x1, y0] + total[x0, y0]
         return found
-
-    def _near(self, way: Array) -> int:
-        """How many places of a way (n, 2) have a line within 2 points."""
-        return int((self._covered(np.hstack([way - 2.0, way + 2.0])) > 0.0).sum())
 
 
 def _sampled(corners: Array) -> Array:

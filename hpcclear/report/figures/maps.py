@@ -57,8 +57,8 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
     panels: list[tuple[str, Array, style.Look, list[float], list[str]]] = [
         (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}, [], []),
         (_PERIOD, cells["period"].values.T, {"norm": steps}, middles, orders),
-        ("regime", regime - 1.0, _categorical(kinds), [*map(float, range(len(kinds)))], kinds),
-        ("motions reached", attractors - 1.0, _categorical(numbers), [*map(float, range(most))], numbers),
+        ("regime", regime - 1.0, style.categories(len(kinds)), [*map(float, range(len(kinds)))], kinds),
+        ("motions reached", attractors - 1.0, style.categories(most), [*map(float, range(most))], numbers),
     ]  # fmt: skip
     for panel, (words, values, options, ticks, texts) in zip(axes[:, 0], panels, strict=False):
         drawn = panel.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
@@ -73,12 +73,6 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
                 axis.set_ticks(range(len(rows)), labels=rows)
     style.below(axes, across)
     return figure
-
-
-def _categorical(names: list[str]) -> style.Look:
-    """Colours of values 0, 1, ... that have no order."""
-    colours, norm = style.categories(max(len(names), 1))
-    return {"cmap": colours, "norm": norm}
 
 
 def _line(cells: Results, name: str) -> "style.Figure":

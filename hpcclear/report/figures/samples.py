@@ -85,7 +85,7 @@ def _cloud(axes: "style.Axes", variable: Variable, result: Variable, shade: Vari
     size = float(np.clip(2000.0 / max(len(x), 1), 0.5, 6.0))
     look: style.Look = {"s": size, "linewidths": 0, "zorder": 2, "label": "sample"}
     if names := labels.options(shade):
-        look["cmap"], look["norm"] = style.categories(len(names))
+        look |= style.categories(len(names))
     drawn = axes.scatter(x[good], y[good], c=colour[good], rasterized=len(x) > 2000, **look)
     if np.isfinite(colour).any() and not names:
         drawn.set_clim(np.nanmin(colour), np.nanmax(colour))

@@ -64,7 +64,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, 1.0 - drawn / height, width / _WIDTH, drawn / height))
     remark = drawing.draw(axes, scene, poses)
-    curves.draw(figure, tables, 1.0, curves.HEIGHT / height, (width / _WIDTH, _BESIDE / _WIDTH))
+    curves.draw(figure, tables, curves.HEIGHT / height, (width / _WIDTH, _BESIDE / _WIDTH))
     top = 1.0 - (above + 0.5 * _LINE) / height
     figure.text(0.02, top, remark, va="top")
     for x, lines in zip((0.02, 0.52), columns, strict=True):

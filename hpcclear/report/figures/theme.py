@@ -4,15 +4,12 @@ No figure names a size, a font or a colour by itself, so that a style sheet of a
 """
 
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
-
-if TYPE_CHECKING:
-    from matplotlib.colors import BoundaryNorm, ListedColormap
 
 Look = dict[str, Any]
 """Options of a curve, as matplotlib calls them."""
@@ -110,12 +107,12 @@ def colour(which: int | str) -> str:
     return to_hex(every[at % len(every)])
 
 
-def categories(count: int) -> "tuple[ListedColormap, BoundaryNorm]":
-    """Colours of as many categories, which have no order, and what gives number k of them, from 0 on, its own."""
+def categories(count: int) -> Look:
+    """Colours of as many categories, which have no order: number k of them, from 0 on, has its own."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
-    colours = ListedColormap([colour(k) for k in range(count)])
-    return colours, BoundaryNorm(np.arange(count + 1) - 0.5, count)
+    colours = ListedColormap([colour(k) for k in range(max(count, 1))])
+    return {"cmap": colours, "norm": BoundaryNorm(np.arange(colours.N + 1) - 0.5, colours.N)}
 
 
 def look(k: int) -> Look:
