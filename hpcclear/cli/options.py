@@ -105,7 +105,7 @@ class Written(NamedTuple):
 
 
 def loaded(written: Written) -> "Scene":
-    """Return the scene of a command, after printing the Python files that it runs, readings of units and likely slips of units."""
+    """Return the scene of a command, after printing the Python files that it runs, readings and likely slips of units."""
     from hpcclear.scene import load_scene
     from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
