@@ -203,9 +203,9 @@ def coordinates(lane, dense, q, v, a):
     """Coordinates of the text, their velocities and accelerations, from those of all bodies."""
     slides = sliding(dense, q, v, a)
     rows = []
-    for kind, body, joint in lane.text.forest.coordinates:
+    for kind, body in lane.text.forest.coordinates:
         if kind == "slide":
-            rows.append(slides[joint])
+            rows.append(slides[lane.text.forest.hangs[body].joint.name])
         else:
             k = dense.first[body] + ("x", "y", "angle").index(kind)
             rows.append((q[k], v[k], a[k]))
