@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import assembly_of, optimised_module
+from hpcclear.base.lowering.values import DOUBLES
 from hpcclear.dynamics.layout import Effects
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.rhs import KINDS
 from hpcclear.dynamics.stepping.problem import Problem
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
@@ -108,5 +108,5 @@ def force_evaluation(problem: Problem, width: int) -> str:
 @cache
 def _compiled(linkage: Linkage, effects: Effects, width: int) -> str:
     motion = linkage.module(effects).motion
-    module = optimised_module(motion, KINDS, FASTMATH, "motion", effects=effects, W=width)
+    module = optimised_module(motion, (DOUBLES, DOUBLES), FASTMATH, "motion", effects=effects, W=width)
     return assembly_of(module)

@@ -21,7 +21,7 @@ from hpcclear.scene.driving import PlanarRunUp, PlanarTable
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-STIFF_DAMPING = 10.0  # damping factor in s/m, or coefficient of a law with restitution, from which "auto" is implicit
+STIFF_DAMPING = 10.0  # fixed damping factor in s/m, or coefficient of a law with restitution, from which "auto" is implicit
 
 
 def coordinate_count(scene: Scene) -> int:
