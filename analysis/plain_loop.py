@@ -32,7 +32,7 @@ NUMBERS = (
     "crank_a_b_x", "rod_a_center_x", "rod_center_b_x", "rod_mass", "rod_inertia", "slider_mass",
 )  # fmt: skip
 CRANK, NEAR, FAR, ROD_MASS, ROD_INERTIA, SLIDER_MASS = (
-    linkage_of(scene("hunt-crossley", 1e-6, 0, 1)).rows[name] for name in NUMBERS
+    linkage_of(scene("hunt-crossley", 1e-6, 0, 1))._given[name] for name in NUMBERS
 )
 """Rows of the mechanism's numbers, the same in all scenes of the benchmarks."""
 

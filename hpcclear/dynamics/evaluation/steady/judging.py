@@ -137,7 +137,7 @@ def spin_up(series: Array, noise: float = 0.0) -> int:
 
 
 def parted(between: Array) -> int:
-    """First of the segments from which on copies are as far apart as they get: distances of copies, or variances between them, (n,) to an index."""
+    """First of the segments from which on copies are as far apart as they get, by distances or variances (n,), to an index."""
     lasting = np.median(between[len(between) // 2 :])
     return int(np.argmax(between >= 0.3 * lasting))
 

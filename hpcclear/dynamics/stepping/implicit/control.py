@@ -26,7 +26,8 @@ CEILING, CEILING_GROWTH = 0.6, 1.05
 
 CALM_STIFFNESS = 2.0  # h |J| below which the explicit method would do
 
-STEEP = 100.0  # s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are, and "auto" is implicit
+STEEP = 100.0
+"""Friction coefficient over ramp speed, s/m, from which kinks decide how long implicit steps are, and "auto" is implicit."""
 
 ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
 """Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
