@@ -108,5 +108,7 @@ def force_evaluation(problem: Problem, width: int) -> str:
 @cache
 def _compiled(linkage: Linkage, effects: Effects, width: int) -> str:
     motion = linkage.module(effects).motion
-    module = optimised_module(motion, (DOUBLES, DOUBLES), FASTMATH, "motion", effects=effects, W=width)
+    module = optimised_module(
+        motion, (DOUBLES, DOUBLES), FASTMATH, "motion", effects=effects, W=width
+    )
     return assembly_of(module)

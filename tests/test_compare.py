@@ -94,6 +94,9 @@ def test_nothing_is_aligned_by_a_constant_and_times_that_fall_are_refused(respon
     told = CliRunner().invoke(cli, words).output
     assert "not aligned, shifted by 0 s" in told
     assert "nan" not in told
+    assert "has 3 rows for" in told
+    table(path, {"time [s]": 1e3 * np.arange(3.0), "crank_moment": np.zeros(3)})
+    assert "Check the unit" in str(CliRunner().invoke(cli, words).exception)
     table(path, {"time [s]": np.array([0.0, 2.0, 1.0]), "crank_moment": np.zeros(3)})
     assert "do not rise" in str(CliRunner().invoke(cli, words).exception)
 

@@ -92,6 +92,8 @@ def test_words_tables_and_units_of_the_objective() -> None:
         ({"objectives": ["mean", {"formula": "m2 +"}]}, "objectives.1.formula", "cannot be read"),
         ({"objectives": ["mean", {"formula": "m2 - m2 + 1"}]}, "objectives.1.formula", "same for all designs"),
         ({"constraints": [{"formula": "(u2 - 0.11)**0.5", "most": 1}]}, "constraints.0.formula", "no real value"),
+        ({"constraints": [{"formula": "m2 + m3", "most": 0.1}]}, "constraints.0.most", "no design keeps it"),
+        ({"objectives": ["mean", {"formula": "m3 + 1 / (m2 - 0.2)"}]}, "objectives.1.formula", "divides by m2 - 0.2"),
         ({"objectives": ["mean", {"formula": "(1e9*m2)**9**2"}]}, "objectives.1.formula", "a power that"),
         ({"objectives": ["mean", {"statistic": "mean", "formula": "m2"}]}, "objectives.1", "either"),
         ({"constraints": [MASS]}, "constraints.0.most", "missing"),

@@ -106,6 +106,9 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
     blind = table(tmp_path / "b.csv", {"n": time, "crank_moment [N m]": time})
     with pytest.raises(InputError, match="neither time nor crank angle"):
         read_measured(blind, "crank_moment", "N m", SPEED)
+    slow = table(tmp_path / "t.csv", {"time [s]": 1e4 * time, "crank_moment [N m]": time**2})
+    with pytest.raises(InputError, match="less than one each"):
+        read_measured(slow, "crank_moment", "N m", SPEED)
     for words, reason in (
         ("joints.crank_rod.clearance", "is not PATH=LO:HI"),
         ("joints.crank_rod.clearance=2um:1um", "bounds are crossed"),

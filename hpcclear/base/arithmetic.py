@@ -155,6 +155,12 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one.id for one in nodes))
 
 
+def divisors(text: str) -> list[str]:
+    """What a formula that `names_in` let through divides by."""
+    nodes = [node for node in ast.walk(_of_variables(text)) if isinstance(node, ast.BinOp)]
+    return [ast.unparse(node.right) for node in nodes if isinstance(node.op, ast.Div)]
+
+
 def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
     """A formula that `names_in` let through, of variables that are numbers or arrays of one shape; NaN where it has no finite
     real value."""

@@ -122,6 +122,9 @@ def _frequency(time: Array, values: Array, nominal: float) -> float:
     """Frequency of the crank, Hz: the one near the nominal at which the revolutions are most alike."""
     span = float(time[-1] - time[0])
     own = values - values.mean()
+    if span * nominal > len(time):
+        reason = f"{len(time)} rows for {span * nominal:.3g} revolutions: less than one each"
+        raise InputError("measured table", "time", reason, "Check its unit, or measure more often")
     if span * nominal < FEWEST or not own.any():
         return nominal
     orders = np.arange(1, 13)

@@ -12,6 +12,7 @@ import numpy as np
 from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.remarks import remark
 from hpcclear.base.units import fits
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
@@ -27,6 +28,9 @@ Alignment = Literal["auto", "angle", "correlation", "none"]
 
 Curve = Callable[[Array], Array]
 """Values of a series at places (n,) along the axis."""
+
+LONGEST, SPARSE = 1e5, 100.0
+"""Revolutions of a table, and to each of its rows, beyond which its times are taken for a slip of units."""
 
 SHIFTS = 720
 """Shifts of a revolution that are tried for the largest correlation; the best is refined between its neighbours."""
@@ -150,6 +154,12 @@ def compare(
         remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
         raise InputError("--align", how, f"{path} has no angle", remedy)
     span = float(place[-1])
+    rounds = float(np.ptp(to_place(given))) / span * turns
+    reason = f"has {len(given)} rows for {rounds:.3g} revolutions"
+    if rounds > min(LONGEST, SPARSE * len(given)):
+        raise InputError("measured table", str(path), reason, "Check the unit of its first column")
+    if rounds > len(given):
+        remark(f"Warning: {path} {reason}: is the unit of its first column right?")
     shift, words = _aligned(how, to_place(given), simulated, measured, span, turns)
     at = to_place(given) + shift
     revolution = int(np.mod(at[0], span) / span * turns + 1e-9) % turns + 1

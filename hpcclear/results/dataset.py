@@ -290,7 +290,9 @@ def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str
             target.attrs[str(name)] = np.atleast_1d(np.asarray(value))
 
 
-def read(path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None) -> Results:
+def read(
+    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
+) -> Results:
     """Read a result file into memory and check it against the table; of a kind and made from a scene, if these are given.
 
     Raises InputError: the file is missing, cut off, changed, foreign, of another kind or scene, or says what cannot be.

@@ -236,9 +236,24 @@ def warnings(scene: SceneTables) -> Iterator[str]:
 def unused(scene: SceneTables) -> Iterator[str]:
     """What a study states and nothing of it reads."""
     study = scene.study
-    if study is not None and study.accuracy is not None and study.verification.draws is not None:
+    if study is None:
+        return
+    draws, algorithm = study.verification.draws is not None, study.swarm.algorithm
+    asked = {goal.statistic for case in study.cases for goal in (*case.goals, *case.kept)}
+    for table, entries, idle, why in (
+        ("verification", "least_samples most_samples contest", draws, "a design gets `samples` draws"),
+        ("verification", "infill_designs infill_samples", not study.verification.infill_rounds, "infill_rounds is 0"),
+        ("swarm", "c1 c2 inertia", algorithm not in (None, "swarm"), f"{algorithm} has settings of its own"),
+        ("accuracy", "quantile", "quantile" not in asked, "no case has a quantile"),
+        ("accuracy", "exceedance", "exceedance" not in asked, "no case has an exceedance"),
+    ):  # fmt: skip
+        own = getattr(study, table)
+        for entry in entries.split() if own is not None and idle else ():
+            if getattr(own, entry) != type(own).model_fields[entry].default:
+                yield f"study.{table}.{entry} is not used: {why}"
+    if study.accuracy is not None and draws:
         yield "study.accuracy is not used: study.verification names how many draws a design gets"
-    if study is None or study.groups or study.sensitivity.groups == ():
+    if study.groups or study.sensitivity.groups == ():
         return
     if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own
         why = "no group of variables is named, and these variables have no usual groups"

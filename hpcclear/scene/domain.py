@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcclear.base.arithmetic import names_in
+from hpcclear.base.arithmetic import divisors, names_in, value_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.cases import Constraint, Goal
 from hpcclear.scene.fields import invalid
 from hpcclear.scene.named import Range
 from hpcclear.scene.planar import slender_inertia
@@ -24,6 +25,9 @@ ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
 FORMULAS = 512
 """Designs at which formulas are tried; of each variable a quarter sits on either bound."""
+CORNERS, SURELY = 10, 0.05
+"""Variables with which all corners are tried, too; and how far beyond a threshold, over the range of its formula, the least
+of these designs is where none can keep it."""
 
 
 @dataclass(frozen=True)
@@ -65,25 +69,43 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
 
 
 def check_formulas(scene: SceneTables) -> None:
-    """An error for validators where a formula of a case has no value at a design of its box, or the same at all."""
-    for case in scene.required_study.cases:
-        names = scene.required_study.design_variables(case.name)
-        unit = np.clip(
-            np.random.default_rng(0).uniform(-0.5, 1.5, (FORMULAS, len(names))), 0.0, 1.0
-        )
+    """An error for validators where a formula of a case has no value at a design of its box, or the same at all, or where all
+    designs break a constraint of it."""
+    study = scene.required_study
+    for case in study.cases:
+        names = study.design_variables(case.name)
+        drawn = np.random.default_rng(0).uniform(-0.5, 1.5, (FORMULAS, len(names)))
+        unit = np.clip(drawn, 0.0, 1.0)
+        if len(names) <= CORNERS:
+            unit = np.vstack([unit, *itertools.product((0.0, 1.0), repeat=len(names))])
         columns = to_physical(scene, names, box(scene, names).at(unit)).T
         for place, goal in case.rows.items():
-            if goal.formula is None:
-                continue
-            key = f"study.cases.{case.name}.{place}.formula"
-            designs = dict(zip(names, columns, strict=True))
-            values = goal.of_design(designs)
-            if not (found := np.isfinite(values)).all():
-                where = (f"{n} = {designs[n][found.argmin()]:.4g}" for n in names_in(goal.formula))
-                reason = f"has no real value where {', '.join(where)}"
-                raise invalid(reason, "Narrow the ranges of its variables, or rewrite it", key)
-            if values.min() == values.max():
-                raise invalid("is the same for all designs", "Remove it, or rewrite it", key)
+            if goal.formula is not None:
+                key = f"study.cases.{case.name}.{place}"
+                _check_formula(study, goal, dict(zip(names, columns, strict=True)), key)
+
+
+def _check_formula(study: Study, goal: Goal, designs: Mapping[str, Array], key: str) -> None:
+    formula, values = str(goal.formula), goal.of_design(designs)
+    remedy, inputs = (
+        "Narrow the ranges of its variables, or rewrite it",
+        names_in(str(goal.formula)),
+    )
+    if not (found := np.isfinite(values)).all():
+        where = (f"{name} = {designs[name][found.argmin()]:.4g}" for name in inputs)
+        raise invalid(f"has no real value where {', '.join(where)}", remedy, f"{key}.formula")
+    if values.min() == values.max():
+        raise invalid("is the same for all designs", "Remove it, or rewrite it", f"{key}.formula")
+    for part in divisors(formula):
+        below = value_of(part, designs)
+        steady = any(study.variable(one).options is None for one in names_in(part))
+        if steady and below.min() < 0.0 < below.max():
+            reason = f"divides by {part}, which is 0 within the ranges"
+            raise invalid(reason, remedy, f"{key}.formula")
+    least = float(values.min()) - SURELY * float(np.ptp(values))
+    if isinstance(goal, Constraint) and len(designs) <= CORNERS and least > goal.most:
+        reason = f"no design keeps it: the least is about {values.min():.4g}"
+        raise invalid(reason, "Raise it, or widen the ranges", f"{key}.most", goal.most)
 
 
 def shares(scene: SceneTables, design: Mapping[str, float]) -> Array:

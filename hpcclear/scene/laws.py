@@ -153,6 +153,10 @@ class LawTable(Table):
             assert isinstance(law, ContactLaw)  # no other table has this entry
             return on_geometry(law, shape, _curve(data))
         known = laws(cls.kind)
+        odd = [key for key in (cls.formula, "units") if name != "expression" and data.get(key)]
+        if odd:
+            remedy = 'Remove it, or write law = "expression"'
+            raise invalid('belongs to law = "expression"', remedy, odd[0])
         if name in known:
             return known[name]  # type: ignore[no-any-return]
         if name == "expression":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hpcclear.base.errors import InputError
 from hpcclear.cli import options as cli
 
 if TYPE_CHECKING:
@@ -45,8 +46,13 @@ def run(
     from hpcclear.report.compare import NOT_ALIGNED, compare
     from hpcclear.results import dataset
 
-    pairs = (one.rpartition("=")[::2] for one in names)
-    chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
+    chosen = dict[str, str]()
+    for pair in names:
+        column, quantity = (word.strip() for word in pair.rpartition("=")[::2])
+        if not (column and quantity) or column in chosen:
+            reason = "is no pair" if column not in chosen else f"{column} has a quantity already"
+            raise InputError("--name", pair, reason, "Write COLUMN=QUANTITY, once for each column")
+        chosen[column] = quantity
     found = compare(dataset.read(file, "response"), measured, align, chosen)
     angular = found.axis == "angle"
     moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.4g} s"

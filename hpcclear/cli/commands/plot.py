@@ -78,7 +78,7 @@ def run(
     from hpcclear.report.html.content import read
 
     cli.check_mode("--animation", animation is not None, its_own=("seconds", "revolutions"))
-    cli.check_mode("--output", output is not None, its_own=("kind", "texts", *look))
+    cli.check_mode("--output", output is not None, its_own=("kind", "texts", "names", *look))
     content = read(*places)
     for name in designs:
         _known("--design", name, content.responses)

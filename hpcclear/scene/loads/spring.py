@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from hpcclear.base.terms import Acting, Term
-from hpcclear.scene.fields import Quantity
+from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.loads.declared import Load, along
 
 
@@ -33,6 +33,11 @@ class SpringLoad(Load):
     acts: Literal["both", "pushing", "pulling"] = "both"
     """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
     stop; "pulling": only when longer, as a rope."""
+
+    def _check(self) -> None:
+        if self.acts == "pushing" and self.length == 0.0:
+            reason = "is missing, and a pushing spring acts below it alone"
+            raise invalid(reason, "Give the length at which it begins to push", "length", None)
 
     def act(self, on: Acting) -> Term:
         """Opposite forces along the line of both places."""
