@@ -216,7 +216,7 @@ def test_statistics_of_several_nodes_are_those_of_one_process(box, tmp_path):
     assert finish(start(statistics(here, 20_000), 0, PLAIN))[0] == 0
     code, output = ended(box, box.start(statistics(there, 20_000), 3), 200.0)
     assert code == 0, output
-    assert len(contents(there)) == 1 + 5 + 1
+    assert len(contents(there)) == 1 + 5  # statistics, and blocks of samples
     assert contents(there) == contents(here)
 
 
