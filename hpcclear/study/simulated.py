@@ -39,9 +39,9 @@ class Simulated:
         self._run, self._case, self._guesses = run, case, guesses
         self.choices = list(start)
         self.made = [truth.nothing(run)] * len(self.choices)
-        self._at = {False: dict[tuple[int, int], Asked](), True: dict[tuple[int, int], Asked]()}
+        self._at = {False: dict[tuple[int, ...], Asked](), True: dict[tuple[int, ...], Asked]()}
         self._guessed: dict[int, Array] = {}
-        self._less = dict[tuple[int, int, int, int], Asked]()
+        self._less = dict[tuple[int, ...], Asked]()
         self._slopes = dict[int, Array]()
         self._parts = dict[tuple[int, int, int], Array]()
         self._rungs = dict[int, int]()
@@ -73,19 +73,25 @@ class Simulated:
         return np.clip(to_coordinates(self._run.scene, names, designs), *bounds.T)
 
     def known(self) -> Array:
-        """What all designs come to, and standard errors, (n, 2, k), as if all had as many simulations as the longest: those
-        that have few are moved by what further ones change of others on average."""
+        """What all designs come to, and standard errors, (n, 2, k), with the bias of as many simulations as the longest has."""
         sizes = self.sizes
         found = np.array([self.of(row, length)[0] for row, length in enumerate(sizes)])
-        off, length = np.zeros(found.shape[2]), int(sizes.max()) // 2
-        while length >= sizes.min():
-            longer = np.flatnonzero(sizes > length).tolist()
-            steps = [self.of(k, 2 * length)[0][0] - self.of(k, length)[0][0] for k in longer]
-            there = np.isfinite(steps)
-            off += np.where(there, steps, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-            found[sizes == length, 0] += off
-            length //= 2
+        found[:, 0] -= self._bias() * (1.0 / sizes - 1.0 / sizes.max())[:, None]
         return found
+
+    def _bias(self) -> Array:
+        """Bias of values over the inverse number of points, (k,). It is seen in the later halves of long designs, since what is
+        lengthened was chosen for its first points."""
+        steps = []
+        for row in np.flatnonzero(self.sizes >= 4 * FIRST).tolist():
+            size = int(self.sizes[row])
+            for begin in range(size // 2, size, 2 * FIRST):
+                middle, end = begin + FIRST, begin + 2 * FIRST
+                halves = self.of(row, middle, begin)[0][0] + self.of(row, end, middle)[0][0]
+                steps.append(halves / 2.0 - self.of(row, end, begin)[0][0])
+        there = np.isfinite(steps)
+        total = np.where(there, steps, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+        return 2.0 * FIRST * total
 
     def error(self, row: int, direction: Array) -> float:
         """Standard error of a design in a direction of the objectives; infinite of one that failed."""
@@ -97,15 +103,16 @@ class Simulated:
         each = [self.of(row, length)[1] for row, length in enumerate(self.sizes)]
         return np.moveaxis(np.array(each), 1, 0)
 
-    def of(self, row: int, length: int) -> Asked:
-        """A design by so many points of each replicate, less what the surrogate says that more points would change."""
+    def of(self, row: int, end: int, begin: int = 0) -> Asked:
+        """A design by some points of each replicate, less what the surrogate says that more points would change."""
         if not self._guesses:
-            return self._asked(row, length)
-        key = row, length, self._rung(1), self._rung(length)
+            return self._asked(row, end, begin)
+        length = end - begin
+        key = row, begin, end, self._rung(1), self._rung(length)
         if key not in self._less:
-            (found, shifts), slopes = self._asked(row, length), self._explained()
+            (found, shifts), slopes = self._asked(row, end, begin), self._explained()
             guess = partial(self._asked, row, guessed=True)
-            (few, its), (many, their) = guess(length), guess(self._guesses.length)
+            (few, its), (many, their) = guess(end, begin), guess(self._guesses.length)
             errors = found[1] - (1.0 - self._left(length, slopes)) * spread(shifts)
             moved = np.array([found[0] - slopes * (few - many)[0], errors])
             self._less[key] = moved, shifts - slopes[:, None] * (its - their)
@@ -143,19 +150,19 @@ class Simulated:
     def _shifts(self, least: int, length: int, guessed: bool = False) -> Array:
         """Shifts of all designs that have so many points of each replicate at least, 0 of those that failed."""
         rows = np.flatnonzero(self.sizes >= least).tolist()
-        return np.nan_to_num([self._asked(k, length, guessed)[1] for k in rows])
+        return np.nan_to_num([self._asked(k, length, guessed=guessed)[1] for k in rows])
 
-    def _asked(self, row: int, length: int, guessed: bool = False) -> Asked:
-        """A design by so many points of each replicate, simulated or by the surrogate."""
+    def _asked(self, row: int, end: int, begin: int = 0, guessed: bool = False) -> Asked:
+        """A design by some points of each replicate, simulated or by the surrogate."""
         kept, choice = self._at[guessed], self.choices[row]
-        if (row, length) not in kept:
+        if (row, begin, end) not in kept:
             if guessed and row not in self._guessed:
                 self._guessed[row] = self._guesses.of(choice, self._guesses.length)
-            made = (self._guessed if guessed else self.made)[row][..., :length]
+            made = (self._guessed if guessed else self.made)[row][..., begin:end]
             asked, design = self._case.goals, choice.design
             values = [goals.goal_value(goal, made, design, 0.95) for goal in asked]
             rows = [(one.value, one.error, one.shifts) for one in values]
             rows += [excess_of(goal, made, design) for goal in self._case.kept]
             found = np.array([one[:2] for one in rows]).T
-            kept[row, length] = found, np.array([one[2] for one in rows])
-        return kept[row, length]
+            kept[row, begin, end] = found, np.array([one[2] for one in rows])
+        return kept[row, begin, end]
