@@ -78,6 +78,9 @@ _MENDS: dict[str, Callable[[str], str]] = {
 def fault(text: str, error: ValueError) -> tuple[str, str]:
     """Return reason and remedy of the first error of a text, as tomllib raised it."""
     lines = text.split("\n")
+    if "integer string conversion" in str(error):
+        number = next(n for n, one in enumerate(lines, 1) if re.search(r"[\d_]{4300}", one))
+        return f"line {number} has a number of more than 4300 digits", "Write 1e300, say"
     place = re.search(r"line (\d+)", str(error))
     number = int(place[1]) if place else len(lines)
     if re.search("Unclosed|at end", str(error)) or _BEGINNING.match(lines[number - 1]):
