@@ -74,6 +74,8 @@ class Settings:
     @property
     def sensor(self) -> Sensor:
         """The sensor; raises InputError where a word is no such number."""
+        if self.noise is not None:
+            number_of("--noise", str(self.noise), "", above=0.0)
         low, high = (self.band or "").partition(":")[::2]
         place, quality = (self.resonance or "").partition(":")[::2]
         return Sensor(

@@ -33,7 +33,7 @@ from hpcclear.ranks.stopping import Exit
     "--angle-error ANGLE", "Standard deviation of the crank-angle reference.", default="0 deg"
 )
 @cli.option(
-    "--noise SHARE", type=cli.Amount(min=0.0, max=1e6, min_open=True),
+    "--noise SHARE", type=cli.Amount(min=0.0, min_open=True),
     words="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
           "revolutions is used too.",
 )  # fmt: skip
