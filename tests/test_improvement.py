@@ -294,6 +294,14 @@ def test_scatter_that_the_surrogate_explains_needs_no_simulations():
     assert errors[0] < 0.2 * simulated(f, 2).of(1, 2)[0][1, 0]
 
 
+def test_first_points_that_designs_were_chosen_for_say_nothing_of_the_bias():
+    f = np.random.default_rng(3).lognormal(0.0, 1.0, (16, 1024))  # few say too much
+    plain, chosen = (simulated(one, 2) for one in (f, np.where(np.arange(1024) < 2, 0.5 * f, f)))
+    moved = [one.known()[1, 0, 0] - one.of(1, 2)[0][0, 0] for one in (plain, chosen)]
+    assert moved[1] < 0.0
+    assert moved[0] == pytest.approx(moved[1])
+
+
 @pytest.mark.nightly
 def test_a_search_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
     formula.replace_dynamics(monkeypatch.setattr)

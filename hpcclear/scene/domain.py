@@ -87,12 +87,9 @@ def check_formulas(scene: SceneTables) -> None:
 
 def _check_formula(study: Study, goal: Goal, designs: Mapping[str, Array], key: str) -> None:
     formula, values = str(goal.formula), goal.of_design(designs)
-    remedy, inputs = (
-        "Narrow the ranges of its variables, or rewrite it",
-        names_in(str(goal.formula)),
-    )
+    remedy = "Narrow the ranges of its variables, or rewrite it"
     if not (found := np.isfinite(values)).all():
-        where = (f"{name} = {designs[name][found.argmin()]:.4g}" for name in inputs)
+        where = (f"{name} = {designs[name][found.argmin()]:.4g}" for name in names_in(formula))
         raise invalid(f"has no real value where {', '.join(where)}", remedy, f"{key}.formula")
     if values.min() == values.max():
         raise invalid("is the same for all designs", "Remove it, or rewrite it", f"{key}.formula")
