@@ -19,6 +19,7 @@ from patience import crowded
 from hpcclear.base import units as scene_units
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
+from hpcclear.scene.describing import unused
 from hpcclear.scene.paths import flatten, replace
 
 ROOT = Path(__file__).parent.parent
@@ -45,6 +46,13 @@ def test_broken_scene_is_refused_with_key_and_remedy(path: Path) -> None:
     assert error.remedy
     assert error.__cause__ is None
     assert error.__suppress_context__ or error.__context__ is None
+
+
+def test_what_nothing_of_a_study_reads_is_said() -> None:
+    words = "verification.samples=10", "verification.contest=3", "accuracy.exceedance=0.1"
+    said = " ".join(unused(load_scene(ROBUST, [f"study.{one}" for one in words])))
+    assert "study.verification.contest is not used" in said
+    assert "study.accuracy.exceedance is not used" in said
 
 
 @pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)

@@ -58,9 +58,6 @@ def sobol_indices(
     return analyse_sobol(function(points), len(bounds), **options)  # type: ignore[arg-type]
 
 
-# the design ---------------------------------------------------------------------------------------
-
-
 # midpoint sensitivity -----------------------------------------------------------------------------
 
 
@@ -78,9 +75,6 @@ def test_midpoint_sensitivity_of_a_cubic_is_exact_at_every_clearance() -> None:
     assert (found.failed == 0).all()
     verdict = convergence_intervals(found)
     assert not verdict.found.any()  # one interval shows no convergence
-
-
-# the convergence loop -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("sigma", [0.0, 1e-6, 1e-5, 5e-5])
@@ -174,9 +168,6 @@ def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
     assert (verdict.interval[1] != 1).all()
 
 
-# selection ----------------------------------------------------------------------------------------
-
-
 def test_selection_compares_effects_over_the_interval_not_slopes() -> None:
     slope = [[2e-4, 1.0, 1e-6]]  # per kg, per kg m2, per m
     chosen = select_influential(["m2", "I2", "u2"], slope, [[1e-6] * 3], [0.3, 4e-4, 0.12])
@@ -185,9 +176,8 @@ def test_selection_compares_effects_over_the_interval_not_slopes() -> None:
 
 
 def test_selection_respects_standard_errors() -> None:
-    names, lengths = ["sure", "noisy", "small", "vague"], [1.0] * 4
-    slope, error = [[1.0, 0.5, 0.01, 0.02]], [[0.01, 0.4, 0.001, 0.5]]
-    chosen = select_influential(names, slope, error, lengths)
+    names, slope = ["sure", "noisy", "small", "vague"], [[1.0, 0.5, 0.01, 0.02]]
+    chosen = select_influential(names, slope, [[0.01, 0.4, 0.001, 0.5]], [1.0] * 4)
     assert chosen.selected == ("sure",)
 
 
