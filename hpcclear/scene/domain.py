@@ -73,16 +73,18 @@ def check_formulas(scene: SceneTables) -> None:
     designs break a constraint of it."""
     study = scene.required_study
     for case in study.cases:
+        formulas = {place: goal for place, goal in case.rows.items() if goal.formula is not None}
+        if not formulas:
+            continue
         names = study.design_variables(case.name)
         drawn = np.random.default_rng(0).uniform(-0.5, 1.5, (FORMULAS, len(names)))
         unit = np.clip(drawn, 0.0, 1.0)
         if len(names) <= CORNERS:
             unit = np.vstack([unit, *itertools.product((0.0, 1.0), repeat=len(names))])
         columns = to_physical(scene, names, box(scene, names).at(unit)).T
-        for place, goal in case.rows.items():
-            if goal.formula is not None:
-                key = f"study.cases.{case.name}.{place}"
-                _check_formula(study, goal, dict(zip(names, columns, strict=True)), key)
+        designs = dict(zip(names, columns, strict=True))
+        for place, goal in formulas.items():
+            _check_formula(study, goal, designs, f"study.cases.{case.name}.{place}")
 
 
 def _check_formula(study: Study, goal: Goal, designs: Mapping[str, Array], key: str) -> None:
