@@ -136,8 +136,7 @@ class Books:
 
 def inside(task: str, samples: int) -> int:
     """One rank of a trial; root prints a line about itself."""
-    from hpcclear.ensemble import session as plain
-    from hpcclear.ensemble import simulate, statistics
+    from hpcclear.ensemble import session as plain, simulate, statistics
     from hpcclear.ensemble.session import Options
     from hpcclear.ranks.boundary import run_on_ranks
     from hpcclear.ranks.team import Ranks

@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 from dense_linkage import Contact, Jet, admissible, assembled, stiffness, turned
-from some_laws import effects_with
-from some_laws import row as row_of_law
+from some_laws import effects_with, row as row_of_law
 
 from hpcclear.base import bits
 from hpcclear.dynamics import layout as at

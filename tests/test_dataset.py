@@ -16,8 +16,7 @@ import pint
 import pint_xarray  # noqa: F401
 import pytest
 import xarray as xr
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import FIELDS, JOINTS, Status, failed, record_type

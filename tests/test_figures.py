@@ -16,8 +16,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from hpcclear import report
-from hpcclear.report.figures import accuracy as accuracy_figures
-from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.figures import accuracy as accuracy_figures, labels, motion, style
 
 DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
 

@@ -10,8 +10,7 @@ import rotors
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
-from hpcclear.laws import laws
-from hpcclear.laws import reynolds as film
+from hpcclear.laws import laws, reynolds as film
 from hpcclear.laws.film import finite
 
 

@@ -7,8 +7,15 @@ import pytest
 from dense_mechanism import THETA2, X2, X3, Y2, admissible, assembled
 from running import scene_with
 from scipy.interpolate import PchipInterpolator
-from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model
-from test_motion import scene_of as scene_of_effects
+from test_motion import (
+    CRANK,
+    FULL,
+    ROD,
+    SLIDER_MASS,
+    SPEED,
+    dense_model,
+    scene_of as scene_of_effects,
+)
 
 from hpcclear.base.outcome import Status
 from hpcclear.base.pieces import periodic

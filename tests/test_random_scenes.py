@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 from hard_case_runs import hard_cases
-from hypothesis import HealthCheck, event, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, event, given, settings, strategies as st
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene

@@ -205,8 +205,7 @@ def run_accuracy(
     Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from
     there. `notify` gets what is going on, a line at a time. Raises InputError, StorageError, Stopped, RankFailed.
     """
-    from hpcclear.report.figures import accuracy as accuracy_figures
-    from hpcclear.report.figures import style
+    from hpcclear.report.figures import accuracy as accuracy_figures, style
 
     style.matplotlib()  # said before the measuring, not after
     place = Place.of_directory(directory, options.fresh)

@@ -23,8 +23,7 @@ from math import isfinite, pi
 
 from hpcclear.base import unit_names
 from hpcclear.base.holding import holding
-from hpcclear.base.unit_names import HEADS, LONGEST, TAILS, UNITS, NoUnit
-from hpcclear.base.unit_names import UnitError as UnitError
+from hpcclear.base.unit_names import HEADS, LONGEST, TAILS, UNITS, NoUnit, UnitError as UnitError
 
 _NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)

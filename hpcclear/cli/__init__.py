@@ -10,6 +10,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -24,10 +25,13 @@ from hpcclear.base.errors import (
 )
 from hpcclear.base.remarks import listen
 from hpcclear.cli import commands
-from hpcclear.cli.options import GROUPS, Command, is_root, say
+from hpcclear.cli.options import GROUPS, Command, Written, is_root, say
 from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 from hpcclear.ranks.terminal import clear
+
+if TYPE_CHECKING:
+    from hpcclear.scene import Scene
 
 OLD = {
     "import": "init --import",
@@ -97,6 +101,20 @@ def cli() -> None:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
+
+
+def loaded(written: Written) -> "Scene":
+    """Return the scene of a command, after printing the Python files that it runs, readings and likely slips of units."""
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.describing import implausible
+    from hpcclear.scene.plugged import files_run
+
+    scene = load_scene(*written)
+    for text in (*files_run(scene.plugins), *map(str, scene.readings)):
+        say(f"Note: {text}")
+    for text in implausible(scene):
+        say(f"Warning: {text}")
+    return scene
 
 
 def _check_words(words: Sequence[str]) -> None:

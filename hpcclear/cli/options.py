@@ -20,7 +20,6 @@ from hpcclear.ranks.terminal import Style, clear, write
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Options
     from hpcclear.ranks.team import Ranks
-    from hpcclear.scene import Scene
 
 PATH = click.Path(path_type=Path, readable=False)  # an unreadable file is reported where it is read
 FILE = click.argument("file", type=PATH)
@@ -102,20 +101,6 @@ class Written(NamedTuple):
 
     file: Path
     overrides: tuple[str, ...]
-
-
-def loaded(written: Written) -> "Scene":
-    """Return the scene of a command, after printing the Python files that it runs, readings and likely slips of units."""
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.describing import implausible
-    from hpcclear.scene.plugged import files_run
-
-    scene = load_scene(*written)
-    for text in (*files_run(scene.plugins), *map(str, scene.readings)):
-        say(f"Note: {text}")
-    for text in implausible(scene):
-        say(f"Warning: {text}")
-    return scene
 
 
 class How(NamedTuple):

@@ -10,8 +10,7 @@ from pydantic import BaseModel, ConfigDict, WithJsonSchema, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from hpcclear.base.errors import InputError, at
-from hpcclear.base.errors import nearest as nearest
+from hpcclear.base.errors import InputError, at, nearest as nearest
 from hpcclear.base.units import factor, is_written_in, keep, shows_point, to_si
 
 HERE = {

@@ -16,8 +16,7 @@ from hpcclear.scene.domain import slender_inertias
 from hpcclear.scene.points import Points, check_points, count_of
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.streams import generator, sobol, uniform
-from hpcclear.scene.streams import unit_lhs as unit_lhs
+from hpcclear.scene.streams import generator, sobol, uniform, unit_lhs as unit_lhs
 from hpcclear.scene.study import Study
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 
 
 @cli.command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
@@ -59,7 +59,7 @@ def _measure(
     written: cli.Written, output: Path, quick: bool, fresh: bool, time_limit: float | None
 ) -> None:
     with cli.on_ranks(time_limit) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.printing import describe
@@ -78,7 +78,7 @@ def _measure(
 
 def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:
     with cli.on_ranks(resumes=False) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.accuracy.plan import Plan, ladder, measure
         from hpcclear.cli.plan import describe, preview
         from hpcclear.ranks.terminal import announce

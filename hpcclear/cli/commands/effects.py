@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 
 
 @cli.command("compute", "Find effects that can be neglected.", ranks=True)
@@ -43,7 +43,7 @@ def run(
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted

@@ -38,8 +38,7 @@ def run(
 
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
-    from hpcclear.cli.tables import console
-    from hpcclear.cli.tables import table as tabled
+    from hpcclear.cli.tables import console, table as tabled
     from hpcclear.report import export as writing
     from hpcclear.report.spread import rows_of, side_by_side
 

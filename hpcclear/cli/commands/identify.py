@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 from hpcclear.ranks.stopping import Exit
 
 
@@ -58,7 +58,7 @@ def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> in
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 
 
 @cli.command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
@@ -58,7 +58,7 @@ def run(
     observing = ("name", "section", "transient", "revolutions")
     cli.check_mode("--bifurcation", bifurcation, ("y",), observing)
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
         from hpcclear.ensemble.maps import number_of, run_map

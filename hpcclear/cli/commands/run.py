@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 from hpcclear.ranks.terminal import Style
 
 
@@ -21,7 +21,7 @@ def run(
     """
 
     with cli.on_ranks(time_limit, cli.STUDYING) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe
         from hpcclear.report.html.content import read
         from hpcclear.study import run_study

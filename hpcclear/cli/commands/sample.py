@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 
 
 @cli.command("compute", "Simulate many designs.", ranks=True)
@@ -53,7 +53,7 @@ def run(
         return _merge(written, output, points) if cli.is_root() else None
     with cli.on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.session import run_sample
         from hpcclear.ensemble.split import Part
@@ -75,7 +75,7 @@ def run(
 
 
 def _merge(written: cli.Written, output: Path, points: Path | None) -> None:
-    scene = cli.loaded(written)
+    scene = loaded(written)
     from hpcclear.cli.printing import describe_run
     from hpcclear.ensemble.session import design, run_merge
     from hpcclear.ranks.boundary import alone

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 from hpcclear.ranks.stopping import Exit
 
 
@@ -24,7 +24,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     if keep is not None:
         overrides = (*written.overrides, f"output.keep_revolutions={keep}")
         written = written._replace(overrides=overrides)
-    scene = cli.loaded(written)
+    scene = loaded(written)
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics import sizing

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hpcclear.cli import options as cli
+from hpcclear.cli import loaded, options as cli
 from hpcclear.ranks.stopping import Exit
 
 
@@ -21,7 +21,7 @@ def run(written: cli.Written, output: Path, how: cli.How) -> int:
     """
 
     with cli.on_ranks(how.time_limit) as ranks:
-        scene = cli.loaded(written)
+        scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.wear import run_wear
         from hpcclear.report.screens.lives import followed

@@ -22,13 +22,18 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.holding import holding
 from hpcclear.report.figures import labels
 from hpcclear.report.figures.printing import Printing, renamed, wanted
-from hpcclear.report.figures.theme import DASHES as DASHES
-from hpcclear.report.figures.theme import MM, RC, WIDTH, matplotlib
-from hpcclear.report.figures.theme import NAMES as NAMES
-from hpcclear.report.figures.theme import Look as Look
-from hpcclear.report.figures.theme import categories as categories
-from hpcclear.report.figures.theme import colour as colour
-from hpcclear.report.figures.theme import look as look
+from hpcclear.report.figures.theme import (
+    DASHES as DASHES,
+    MM,
+    NAMES as NAMES,
+    RC,
+    WIDTH,
+    Look as Look,
+    categories as categories,
+    colour as colour,
+    look as look,
+    matplotlib,
+)
 from hpcclear.report.parts import FigureOf
 from hpcclear.results import files
 from hpcclear.results.content import Results

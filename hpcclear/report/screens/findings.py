@@ -7,8 +7,7 @@ import numpy as np
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import identified, targets
-from hpcclear.report.figures import effects as screening
-from hpcclear.report.figures import labels
+from hpcclear.report.figures import effects as screening, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted, upper
 from hpcclear.results.content import Results

@@ -9,8 +9,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.base.student import student
-from hpcclear.dynamics.evaluation.steady import effort as given
-from hpcclear.dynamics.evaluation.steady import judging
+from hpcclear.dynamics.evaluation.steady import effort as given, judging
 from hpcclear.dynamics.evaluation.steady.copies import PERTURBATION
 from hpcclear.dynamics.evaluation.steady.effort import STRICTER, Effort, Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.look import look

@@ -8,8 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.evaluation.steady import effort as given
-from hpcclear.dynamics.evaluation.steady import judging
+from hpcclear.dynamics.evaluation.steady import effort as given, judging
 from hpcclear.dynamics.evaluation.steady.copies import PERTURBATION, perturbed, separation
 from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.judging import objective

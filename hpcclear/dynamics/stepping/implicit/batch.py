@@ -16,8 +16,7 @@ from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Stepped, block_at, rules_in
 from hpcclear.dynamics.layout.views import RunSettings
-from hpcclear.dynamics.stepping.implicit import columns, control, kinks, newton
-from hpcclear.dynamics.stepping.implicit import memory as mem
+from hpcclear.dynamics.stepping.implicit import columns, control, kinks, memory as mem, newton
 from hpcclear.dynamics.stepping.implicit.memory import ALL_KINKS, COLUMNS, STAGES, Moved, N
 
 

@@ -11,8 +11,7 @@ from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import run_motion, run_observed
 from hpcclear.dynamics.stepping.control import measure, place
-from hpcclear.dynamics.stepping.implicit import memory as mem
-from hpcclear.dynamics.stepping.implicit import radau as rad
+from hpcclear.dynamics.stepping.implicit import memory as mem, radau as rad
 from hpcclear.dynamics.stepping.implicit.control import MAX_ITERATIONS, begin_iteration, rate_of
 from hpcclear.dynamics.stepping.implicit.inverses import invert_complex, invert_real
 from hpcclear.dynamics.stepping.implicit.kinks import kink_functions
