@@ -78,8 +78,7 @@ class Writer:
         self.free = free
         self.hoist = hoist
         self.derived: dict[str, str] = {}  # name: text in parameters
-        self.inputs: dict[str, None] = {}  # parameters that a line or a derived one reads
-        self.read: set[str] = set()  # those that have a row
+        self.read: set[str] = set()  # parameters that a line reads, each of which has a row
         self.functions: dict[str, Callable[..., object]] = {}  # of loads, which lines call
         self._derived_names: dict[str, str] = {}
         self._pending: dict[str, tuple[tuple[str, ...], str, tuple[Term, ...]]] = {}
@@ -184,7 +183,8 @@ class Writer:
 
     def _body(self, term: Term, plain: bool) -> str:
         if term.op == "name":
-            self._need(term, plain)
+            if not plain:
+                self._need(term)
             return term.name
         parts = [self.text(abs(part), within=1, plain=plain) for part in term.args[:1]]
         if term.op != "+":
@@ -195,19 +195,15 @@ class Writer:
             text += (" - " if part.negative else " + ") + written
         return text
 
-    def _need(self, term: Term, plain: bool) -> None:
+    def _need(self, term: Term) -> None:
         """Write down what a name stands for, if that is not done yet."""
         name = term.name
-        if term.fixed and name not in self.derived:
-            self.inputs.setdefault(name)
-        if plain:
-            return
         if name in self._pending:
             names, line, needs = self._pending[name]
             for one in names:
                 self._pending.pop(one)
             for needed in needs:
-                self._need(needed, plain)
+                self._need(needed)
             self.lines.append(line)
         elif term.fixed and name not in self.read:
             self.read.add(name)

@@ -41,14 +41,13 @@ class LookUp(NamedTuple):
 class LookUps:
     """Those of a mechanism's curves (`found`, by their names), and the parameters that they read besides those of its text.
 
-    `rows`, `read` and `inputs` are as of `expression.Writer`.
+    `rows` and `read` are as of `expression.Writer`.
     """
 
     def __init__(self, forest: Forest, rows: Rows, text: Writer) -> None:
         self._forest, self._rows = forest, rows
         self.rows, self._free = text.rows, text.free
         self.read: set[str] = set()
-        self.inputs: dict[str, None] = {}
         parts = (*forest.mechanism.drives, *forest.mechanism.loads)
         self.found = {name: self._of(one) for one in parts for name in curves_of(one)}
 
@@ -76,7 +75,6 @@ class LookUps:
         rate = write.text(kin.spin(self._forest.frames[body]) * share)
         self.rows, self._free = write.rows, write.free
         self.read |= write.read
-        self.inputs |= write.inputs
         return LookUp(tuple(write.lines), text, rate)
 
 
@@ -93,8 +91,7 @@ class Motion:
     source: str  # of the function ``lane(effects, joints, work, par, i, W)``
     forest: Forest
     parameters: dict[str, int]  # rows of `par` by name
-    derived: dict[str, str]  # texts of the derived parameters, by name, in parameters of `inputs`
-    inputs: tuple[str, ...]  # names that `numbers.values` gives a number to
+    derived: dict[str, str]  # texts of the derived parameters, by name; see `numbers.row_of`
     constraints: tuple[str, ...]  # names of the multipliers
     # rows of tabulated values, by drive or load
     curves: Mapping[str, int] = field(default_factory=dict)
@@ -145,8 +142,7 @@ class _Generator(MotionEquations):
             f"def lane(effects, joints, work, par, i, W):\n{lines}\n",
             self.forest,
             names,
-            {name: text for name, text in self.writer.derived.items() if name in names},
-            tuple(self.writer.inputs | look_ups.inputs),
+            self.writer.derived,
             tuple(row.name for row in self.constraints),
             self.rows.curves,
             look_ups.found,
