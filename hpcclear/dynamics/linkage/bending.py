@@ -260,15 +260,6 @@ def bent(
         along * rate_along + across * rate_across + spin * linear("turned", v)
         + 0.5 * found["mass"] * (v * v).sum(axis=0) + 0.5 * spin * spin * quadratic("spun", q, q)
     )  # fmt: skip
-    return Bent(
-        kinetic, 0.5 * linear("stiffness", q * q), (inwards, sideways),
-        shortened(found, q, v)[0],
-    )  # fmt: skip
-
-
-def shortened(found: Mapping[str, Number], q: Array, v: Array) -> tuple[Array, Array]:
-    """delta (m) and its rate (m/s), shape (m,), of amplitudes and velocities (modes, m); `found`: of `numbers`."""
-    by = [found[f"nearer_{mode}"] for mode in range(1, len(q) + 1)]
-    twice = sum(k * a * a for k, a in zip(by, q, strict=True))
-    rate = sum(k * a * b for k, a, b in zip(by, q, v, strict=True))
-    return 0.5 * twice, rate  # type: ignore[return-value]
+    strain = 0.5 * linear("stiffness", q * q)
+    delta = 0.5 * sum(found[f"nearer_{i}"] * q[i - 1] * q[i - 1] for i in rows)
+    return Bent(kinetic, strain, (inwards, sideways), np.asarray(delta))
