@@ -220,7 +220,7 @@ def with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
     the former are 0."""
     rows = np.pad(p, ((0, 0), (0, at.FURTHER - p.shape[1])))
     for joint in scene.pins():
-        own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
+        own = rows[:, at.WAVES + 2 * first_wave(scene, joint) :]
         paths = wave_paths(scene, joint)
         for k in range(len(paths) // 2):
             cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
@@ -242,8 +242,8 @@ def _share_that_wears(scene: Scene, get: Numbers, joint: str) -> Array:
     return np.stack([slope, np.full(get.size, -1.0 / RAMP)], axis=-1)
 
 
-def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
-    """First row of a joint's waves among `layout.WAVE_ROWS`, and how many. Raises InputError if there are more than rows."""
+def first_wave(scene: Scene, joint: str) -> int:
+    """First row of a joint's waves among `layout.WAVE_ROWS`. Raises InputError if there are more than rows."""
     rows = 2 * sum(scene.waves().values())
     place = scene.joint_labels.index(joint)
     first = rows * place
@@ -253,7 +253,7 @@ def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
             rows // 2, f"all joints together have more than {at.WAVE_ROWS // 2} waves",
             f"Take {at.WAVE_ROWS // 2 // (place + 1) // 2} around each surface at most",
         )  # fmt: skip
-    return first, rows
+    return first
 
 
 def wave_paths(scene: Scene, joint: str) -> list[str]:

@@ -268,7 +268,7 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)
     if coherent:  # copies have not parted: their mean scatters in time like one of them
-        limit = judging.with_limit(kept.mean(axis=1))[2]
+        _, limit = judging.with_limit(kept.mean(axis=1))
     several = bool(len(kept) > 1 and apart > 4.0 * within / len(kept))
     regime = Regime.SEVERAL if several else Regime.CHAOTIC
     if coherent or max(apart, within if np.isfinite(within) else 0.0) < (1e-5 * mean) ** 2:

@@ -86,10 +86,10 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
     return remaining(float(steps[2]), float(steps[1]))
 
 
-def with_limit(values: Array) -> tuple[float, float, float]:
-    """Mean of independent values (n,), its standard error, and the half-width of its confidence interval."""
+def with_limit(values: Array) -> tuple[float, float]:
+    """Mean of independent values (n,), and the half-width of its confidence interval."""
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    return float(np.mean(values)), error, student(LEVEL, len(values) - 1) * error
+    return float(np.mean(values)), student(LEVEL, len(values) - 1) * error
 
 
 def variance_of_mean(groups: list[Array]) -> tuple[float, float]:

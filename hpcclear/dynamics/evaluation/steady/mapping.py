@@ -70,7 +70,7 @@ def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Me
         if len(logs) in LOOKS:
             # of logarithms (revolutions, copies), in four segments of each copy
             pieces = [piece.mean(axis=0) for piece in np.array_split(np.array(logs), 4)]
-            growth, _, limit = judging.with_limit(np.concatenate(pieces))
+            growth, limit = judging.with_limit(np.concatenate(pieces))
             start = start[:OWN]
             if limit <= sure * max(abs(growth), 1.0) or len(logs) == LOOKS[-1]:
                 break
@@ -119,7 +119,7 @@ def _judged(
     mean = float(objective(own.mean(axis=(0, 1))))
     period = judging.period_of(f, REPEATS * mean)
     means, scatter = _averages(own)
-    limit = judging.with_limit(means)[2]
+    _, limit = judging.with_limit(means)
     several = bool(np.ptp(means) > 2.0 * SAME * mean + 6.0 * scatter.max())
     chaotic = growth > doubt and period is None
     regime = Regime.CHAOTIC if chaotic else Regime.SEVERAL if several else Regime.REGULAR
