@@ -220,12 +220,9 @@ def constant(value: float) -> ast.expr:
     return ast.UnaryOp(ast.USub(), made) if math.copysign(1.0, value) < 0.0 else made
 
 
-def fold(node: ast.BinOp, written: ast.expr | None = None) -> ast.expr:
+def fold(node: ast.BinOp, written: ast.expr) -> ast.expr:
     """The number of an operation on two numbers, else the operation. Raises FormulaError of `written` if it is not finite."""
-    if type(node.op) not in _SIGNS:
-        raise FormulaError(f"contains more than arithmetic: {_shown(node)}")
     left, right = number_of(node.left), number_of(node.right)
-    written = node if written is None else written
     if isinstance(node.op, ast.Div) and right == 0.0:
         raise FormulaError(f"divides by zero: {_shown(written)}", "Correct it")
     if left is None or right is None:
