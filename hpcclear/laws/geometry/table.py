@@ -9,10 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from hpcclear.base.pieces import Rows
 from hpcclear.laws.declared import Geometry, Parameter
 from hpcclear.laws.formula import function_of
-
-Rows = tuple[tuple[float, float], ...]
 
 EXAMPLE = ((1e-6, 100.0),)
 

@@ -68,7 +68,7 @@ class Load(Table):
             )
 
     @property
-    def straight(self) -> dict[str, tuple[tuple[float, float], ...]]:
+    def straight(self) -> dict[str, Rows]:
         """Its tables that run straight from row to row (`Acting.piecewise`), by the names that their parameters begin with."""
         return {}
 
