@@ -63,7 +63,6 @@ BROKEN = {
         lambda: replace(BASE, joints=BASE.joints[1:3]), "bodies.crank", "to the ground",
     ),
     "no body": (lambda: replace(BASE, bodies=()), "bodies", "no body"),
-    "no drive": (lambda: replace(BASE, drives=()), "drives", "nothing drives"),
     "a drive of no body": (
         lambda: replace(BASE, drives=(changed(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
     ),

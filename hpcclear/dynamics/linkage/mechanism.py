@@ -310,11 +310,6 @@ def _connected(m: Mechanism) -> None:
 
 
 def _drives(m: Mechanism) -> None:
-    if not m.drives:
-        raise InputError(
-            "drives", None, "nothing drives the mechanism",
-            'Add [drives.NAME] with a kind, say "constant-speed", and a body; "free" with an interval lets it go',
-        )  # fmt: skip
     groups = joined(m, ("slide", "fixed"))
     driven: dict[int, str] = {}
     for drive in m.drives:

@@ -15,6 +15,7 @@ from hpcclear.scene.points import Points
 
 def mechanism_of(planar: Planar) -> Mechanism:
     """The mechanism of a scene's tables; InputError names the entry below ``mechanism``."""
+    turns_of(planar)  # refuses one that nothing drives
     with at("mechanism"):
         return Mechanism(**_tables(planar))
 
