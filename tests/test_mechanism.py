@@ -62,7 +62,7 @@ BROKEN = {
     "nothing on the ground": (
         lambda: replace(BASE, joints=BASE.joints[1:3]), "bodies.crank", "to the ground",
     ),
-    "no body": (lambda: replace(BASE, bodies=()), "bodies", "no body"),
+    "no body": (lambda: replace(BASE, bodies=()), "bodies", "Add [mechanism.bodies."),
     "a drive of no body": (
         lambda: replace(BASE, drives=(changed(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
     ),

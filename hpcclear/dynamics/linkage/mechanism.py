@@ -136,7 +136,8 @@ def _names(m: Mechanism) -> None:
             remedy = "Give the point another name"
             raise InputError(f"{key}.points.center", one.points["center"], reason, remedy)
     if not m.bodies:
-        raise InputError("bodies", None, "there is no body", "Add [bodies.NAME] with its mass")
+        remedy = "Add [mechanism.bodies.NAME] with its mass"
+        raise InputError("bodies", None, "there is no body", remedy)
 
 
 def _places(m: Mechanism) -> None:
