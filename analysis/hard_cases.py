@@ -11,7 +11,7 @@ residual is relative to the largest of kinetic energy and integral of |driving p
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib
@@ -30,7 +30,7 @@ from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS, outcome_record
 from hpcclear.dynamics.planar.energy import energies
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import Lanes
@@ -108,7 +108,7 @@ def chunks(lanes: Lanes) -> Iterator[np.ndarray]:
 
 def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
-    problem = problem_of(scene, energies=True, series=True)
+    problem = replace(problem_of(scene), effects=effects_of(scene, recorded=True))
     n, par = problem.coordinates, parameters(scene)
     start = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))

@@ -60,9 +60,9 @@ def integrate(scene: Scene):
     return steps, recording.record(), recording.samples[0].par
 
 
-def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> Run:
+def run(scene: Scene, effects=None, par_changes=None, shift=None) -> Run:
     """Simulate; `effects` forces kernel flags, `par_changes` rows of parameters, `shift` adds to the start (2, n)."""
-    problem = problem_of(scene, **options)
+    problem = problem_of(scene)
     if effects:
         problem = replace(problem, effects=problem.effects._replace(**effects))
     par = parameters(scene)

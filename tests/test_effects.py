@@ -145,7 +145,7 @@ def torque_scene(flywheel, torque, revolutions=1, rtol=1e-9):
 @pytest.mark.parametrize(("flywheel", "torque"), [(1e-3, 10.0), (1e-2, -20.0)])
 def test_torque_drive_keeps_the_energy_balance(flywheel, torque):
     scene = torque_scene(flywheel, torque, revolutions=3)
-    result = run(scene, energies=True)
+    result = run(scene, effects={"energies": 1})
     rest, passed = energy_residual(scene, result)
     assert abs(rest) < 1e-6 * passed
 
@@ -153,10 +153,11 @@ def test_torque_drive_keeps_the_energy_balance(flywheel, torque):
 @pytest.mark.full
 def test_a_heavy_flywheel_tends_to_constant_speed_like_its_inverse():
     """The crank's speed is disturbed by 1/J, and so is the state after one turn: ten times heavier, a tenth."""
-    constant = run(scene_with({"effects.contact": HUNT_CROSSLEY}, rtol=1e-11), energies=True)
+    scene = scene_with({"effects.contact": HUNT_CROSSLEY}, rtol=1e-11)
+    constant = run(scene, effects={"energies": 1})
     differences = []
     for flywheel in (1e2, 1e3, 1e4):
-        free = run(torque_scene(flywheel, 0.0, rtol=1e-11), energies=True)
+        free = run(torque_scene(flywheel, 0.0, rtol=1e-11), effects={"energies": 1})
         change = np.concatenate(
             [free.q[-1, :4] - constant.q[-1], (free.v[-1, :4] - constant.v[-1]) / 500]
         )

@@ -5,7 +5,7 @@ Here over a few revolutions; `tests/run.sh --full` runs whole files and tighter 
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
@@ -161,7 +161,7 @@ def test_every_number_that_is_not_finite_is_refused(latched: Scene, bad: float):
 @pytest.mark.parametrize("bad", BAD)
 def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: float):
     """Behind the validation: each parameter and each part of the start state in turn, one sample each."""
-    problem = problem_of(latched, energies=True, series=True)
+    problem = replace(problem_of(latched), effects=effects_of(latched, recorded=True))
     par = np.repeat(parameters(latched), Parameters.size + Start.size, axis=0)
     start = start_states(latched, par)
     for k in range(Parameters.size):

@@ -1,6 +1,7 @@
 """Equations of motion against a dense nine-coordinate model that shares no formula with them."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -265,9 +266,9 @@ def reduced(effects, values):
 
 def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
-    problem = problem_of(
-        scene_of(frozenset(effects)), series="series" in effects, energies="energies" in effects
-    )
+    problem = problem_of(scene_of(frozenset(effects)))
+    asked = {name: 1 if name in effects else None for name in ("series", "energies")}
+    problem = replace(problem, effects=problem.effects._replace(**asked))
     if "lugre" in effects:
         z = deflected(effects)
         q, v = np.concatenate([np.full(len(z), 7.0), q]), np.concatenate([z, v])

@@ -51,13 +51,14 @@ def scene() -> Scene:
             "joints.rod_slider.start_eccentricity": [0.7e-3, 0.0],
             "numerics.transient_revolutions": 0,
             "numerics.averaged_revolutions": 1,
+            "numerics.energy": True,
         }
     )
 
 
 def state_after(scene: Scene, tableau: Tableau, steps: int) -> np.ndarray:
     """Coordinates, velocities and both mean gaps after a stretch in equal steps."""
-    problem = replace(problem_of(scene, energies=True), tableau=tableau)
+    problem = replace(problem_of(scene), tableau=tableau)
     problem = ConstantSteps(**vars(problem))
     par = parameters(scene)
     p = Parameters(par)

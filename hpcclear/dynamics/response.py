@@ -134,7 +134,7 @@ def kernel_of(scene: Scene) -> tuple[object, ...] | None:
     if steady or coordinate_count(scene) == 0 or refused_of(scene) is not None:
         return None
     problem = problem_of(scene)
-    kinds = (problem.effects, effects_of(scene, series=True, energies=True, impacts=True))
+    kinds = (problem.effects, effects_of(scene, recorded=True))
     motions = [(problem.linkage.module(effects).__name__, effects) for effects in kinds]
     settings = problem.settings().rows.tobytes()
     return (*motions, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())

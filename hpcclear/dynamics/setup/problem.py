@@ -31,10 +31,8 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(
-    scene: Scene, *, series: bool = False, energies: bool | None = None, impacts: bool | None = None
-) -> at.Effects:
-    """Which branches of the kernel are compiled for this scene."""
+def effects_of(scene: Scene, *, recorded: bool = False) -> at.Effects:
+    """Which branches of the kernel are compiled for this scene, or for a record of all that its motion has."""
     e = scene.effects
     count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
@@ -48,10 +46,10 @@ def effects_of(
         friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         torque=_flag(not main.prescribed and bool(main.advance)),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
-        energies=_flag(scene.numerics.energy if energies is None else energies),
-        series=_flag(series),
-        responses=_flag(scene.responses_asked() or bool(impacts)),
-        impacts=_flag(bool(count) and (scene.impacts_asked() if impacts is None else impacts)),
+        energies=_flag(recorded or scene.numerics.energy),
+        series=_flag(recorded),
+        responses=_flag(recorded or scene.responses_asked()),
+        impacts=_flag(bool(count) and (recorded or scene.impacts_asked())),
         wear=_flag(bool(scene.worn_joints())),
         waves=_flag(any(waves.values())),
         bearing_waves=waves["bearing"] or None,
@@ -112,14 +110,14 @@ def check_objective(scene: Scene) -> None:
 
 
 @lru_cache(maxsize=16)
-def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> Problem:
+def problem_of(scene: Scene) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
     linkage = planar.linkage_of(scene)
     return Problem(
         linkage=linkage,
-        effects=effects_of(scene, series=series, energies=energies),
+        effects=effects_of(scene),
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,

@@ -117,7 +117,7 @@ class Recording:
         self._start = Start(np.concatenate([begin.rows for begin in start]))
         kept = len(self._par)
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
-        observed = effects_of(scene, series=True, energies=True, impacts=True)
+        observed = effects_of(scene, recorded=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed, kept)
         self._evaluator = Evaluator(
             scene, design, perturbations=perturbations, objective=objective, recorder=self._lanes
