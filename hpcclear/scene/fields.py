@@ -250,17 +250,17 @@ class Quantity(Converted):
         return within & (value != 0.0) if self.nonzero else within
 
     def bounds(self, unit: str | None = None) -> str:
-        """The bounds in words, in a unit; by default that of the entry."""
+        """The bounds in words, in a unit, by default that of the entry; empty where there are none."""
         unit = self.unit if unit is None else unit
         times = float(factor(unit, self.unit)) if unit != self.unit else 1.0
         limits = {"above": self.above, "at least": self.least, "below": self.below}
         limits["at most"] = self.most
         parts = [f"{word} {one / times:.6g}" for word, one in limits.items() if one is not None]
         parts += ["other than 0"] * self.nonzero
-        return " and ".join(parts) + (f" {unit}" if unit else "")
+        return " and ".join(parts) + (f" {unit}" if unit and parts else "")
 
     def _remedy(self) -> str:
-        limits = self.bounds() if self.bounds().strip() != self.unit else ""
+        limits = self.bounds()
         unit = f" in {self.unit}" if self.unit and not limits else ""
         return f"Write a number{unit}{' ' if limits else ''}{limits}"
 

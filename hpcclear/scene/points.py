@@ -163,7 +163,7 @@ def check_points(scene: Scene, points: Points, label: Label = "sample {}".format
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
         for path in paths:
             entry = quantities()[path]
-            reason = " and ".join(filter(None, ("must be finite", entry.bounds())))
+            reason = f"must be finite and {entry.bounds() or 'within the physical range'}"
             refuse(~entry.holds(column), column, entry.unit, name, reason)
             if path.endswith("initial_speed"):
                 usual = path.replace("initial_speed", "expected_speed")
@@ -297,7 +297,7 @@ def _read(sheet: "Sheet", column: "SheetColumn", paths: Sequence[str]) -> Array:
     values = sheet.si(column, every[0].unit, sheet.path)
     for quantity in every:
         for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
-            reason = f"must be {quantity.bounds()}"
+            reason = f"must be {quantity.bounds() or 'within the physical range'}"
             remedy = "Correct the value or the unit of its column"
             raise InputError(sheet.place(column, row), column.cells[row], reason, remedy)
     return values
