@@ -1,10 +1,8 @@
 """Service lives as a dataset: curves and their quantiles, profiles, survival, main causes, and warnings."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.setup.parameters import parameters
@@ -189,28 +187,26 @@ def statistics(
     objective = np.where(gone, np.inf, values["objective"])
     known = ends[~np.isnan(ends)]
     dead = (known[:, None] <= cycles).sum(axis=0)
-    dead_lower, dead_upper = share_interval(dead, len(known))
-    share = dead / len(known) if len(known) else np.full(len(cycles), np.nan)
+    share, lower, upper = _shares(dead, np.array(len(known)))
     made = {
         "clearance_quantile": quantiles(clearance, LEVELS),
         "objective_quantile": quantiles(objective, LEVELS),
         "lifetime_quantile": quantiles(ends, LEVELS),
         "survival": 1.0 - share,
-        "survival_lower": 1.0 - dead_upper,
-        "survival_upper": 1.0 - dead_lower,
+        "survival_lower": 1.0 - upper,
+        "survival_upper": 1.0 - lower,
     }
     if limit is not None:
         there = (over[:, None] & (ended <= cycles))[..., None]
-        made |= dict(_exceeded(np.where(there, at_end[:, None], local), limit))
+        largest = np.where(there, at_end[:, None], local)
+        found = _shares((largest > limit).sum(axis=0), (~np.isnan(largest)).sum(axis=0))
+        names = ("exceedance", "exceedance_lower", "exceedance_upper")
+        made |= zip(names, found, strict=True)
     return made
 
 
-def _exceeded(clearance: Array, limit: float) -> Iterator[tuple[str, Array]]:
-    """Share of lives above a limit at each revolution and joint, and its 95 % confidence intervals."""
-    total = (~np.isnan(clearance)).sum(axis=0)
-    above = (clearance > limit).sum(axis=0)
-    lower, upper = share_interval(above, total)
+def _shares(count: Integers, total: Integers) -> tuple[Array, Array, Array]:
+    """Shares of lives, NaN where there are none, and both ends of their 95 % confidence intervals."""
+    lower, upper = share_interval(count, total)
     with np.errstate(invalid="ignore", divide="ignore"):
-        yield "exceedance", above / total
-    yield "exceedance_lower", lower
-    yield "exceedance_upper", upper
+        return count / total, lower, upper
