@@ -239,7 +239,7 @@ def _ended(ranks: Ranks, error: BaseException | None) -> int:
     return _dismiss(ranks, code, note)
 
 
-def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
+def _dismiss(ranks: Ranks, code: int, note: str) -> int:
     """Notify the others to leave; after a failure those who do not listen are ended.
 
     An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.

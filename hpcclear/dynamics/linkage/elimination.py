@@ -41,7 +41,7 @@ class Elimination:
 
     def __init__(
         self, writer: Writer, matrix: Matrix, block: list[int], held: int,
-        inverse: Callable[[Term], Term | None], passed: Mapping[int, Sequence[int]] = {},
+        inverse: Callable[[Term], Term | None], passed: Mapping[int, Sequence[int]],
     ) -> None:  # fmt: skip
         self.writer = writer
         self.block = block

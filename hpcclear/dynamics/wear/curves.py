@@ -142,7 +142,7 @@ def local_bounds(joints: Joints, limits: Mapping[str, float]) -> Array:
 
 
 def first_passed(
-    found: Life, joints: Joints, limits: Mapping[str, float], relief: Relief = FLAT, since: int = 0
+    found: Life, joints: Joints, limits: Mapping[str, float], relief: Relief, since: int = 0
 ) -> tuple[float, str]:
     """Revolutions at which a life first passes a limit, and its name; infinite and "" where it passes none.
 
