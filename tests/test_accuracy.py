@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import opened
@@ -12,7 +13,7 @@ from scipy.stats import chi2, f
 from hpcclear.accuracy import averaging, integration, random_inputs, spending
 from hpcclear.accuracy.looked_at import QUANTITIES
 from hpcclear.accuracy.profile import QUICK
-from hpcclear.accuracy.run import measure
+from hpcclear.accuracy.run import Panels
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
@@ -222,9 +223,15 @@ def test_clearances_that_differ_are_varied_apart():
 # ---- all of it ------------------------------------------------------------------------------------
 
 
+def panels_of(scene):
+    kept = {}
+    store = SimpleNamespace(load_stage=kept.get, save_stage=kept.__setitem__)
+    return Panels(scene, alone(), TINY, print, store, lambda content: None)
+
+
 @pytest.fixture(scope="module")
 def measured():
-    return measure(TWIN, alone(), TINY).to_xarray()
+    return panels_of(TWIN).measured().to_xarray()
 
 
 def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
@@ -257,4 +264,4 @@ def test_without_clearance_there_is_nothing_to_measure():
     ideal = {key: {"kind": "ideal"} for key in ("joints.crank_rod", "joints.rod_slider")}
     scene = PAPER.with_({**ideal, "effects.contact": None, "effects.friction": {"law": "none"}})
     with pytest.raises(InputError, match="without clearance"):
-        measure(scene, alone(), TINY)
+        panels_of(scene).measured()

@@ -38,11 +38,12 @@ Simulate = Callable[[Scene, str, Profile, Ranks], tuple[Array, float]]
 class Panels:
     """Panels one after the other; what was kept is not measured again.
 
-    `notify` gets what is going on, a line at a time; `show` the dataset of all that is there whenever there is more of it.
+    `notify` gets what is going on, a line at a time; `show` the dataset of all that is there whenever there is more of it;
+    `store` keeps finished work.
     """
 
     def __init__(
-        self, scene: Scene, ranks: Ranks, profile: Profile, notify: Notify, store: Checkpoint | None,
+        self, scene: Scene, ranks: Ranks, profile: Profile, notify: Notify, store: Checkpoint,
         show: Callable[[Results], object],
     ) -> None:  # fmt: skip
         self.scene, self.ranks, self.profile = scene, ranks, profile
@@ -66,19 +67,12 @@ class Panels:
 
     def kept(self, name: str, work: Callable[[], Variables]) -> Variables:
         """What `work` gives, or gave before."""
-        found = self._stored(name)
+        found = self._store.load_stage(name)
         if found is None:
             self.notify(name.replace("-", " "))
             found = work()
-            self._save(name, found)
+            self._store.save_stage(name, found)
         return found
-
-    def _stored(self, name: str) -> Variables | None:
-        return None if self._store is None else self._store.load_stage(name)
-
-    def _save(self, name: str, data: Variables) -> None:
-        if self._store is not None:
-            self._store.save_stage(name, data)
 
     def panel(self, name: str, work: Callable[[], Variables]) -> None:
         """Add the variables of a panel."""
@@ -112,7 +106,7 @@ class Panels:
 
     def add_spending(self) -> None:
         """Error of a steady mean against time; goes on from the copies that were kept, a doubling at a time."""
-        found = self._stored("copies")
+        found = self._store.load_stage("copies")
         run = spending.Run.of(self.scene) if found is None else spending.Run(**found)
         if found is None:
             self.notify("tolerance and revolutions")
@@ -121,7 +115,7 @@ class Panels:
         with self.ranks.stage("spending"):
             until, check = self.profile.segments, self.ranks.raise_if_stopped
             for longer in spending.measure(self.scene, run, until, check):
-                self._save("copies", vars(longer))
+                self._store.save_stage("copies", vars(longer))
                 self._add(spending.analyse(longer))
 
     def add_study(self) -> None:
@@ -153,43 +147,34 @@ class Panels:
         count = parallel.samples_of(seconds, profile)
         self.attributes["batch"] = f"ranks: {count} samples, or as many a rank"
 
+    def measured(self) -> Results:
+        """All panels of a scene with a clearance joint at least; on root. Returns results of kind ``accuracy``.
+
+        Raises InputError if no joint has clearance, or the objective is of some joints.
+        """
+        scene, ranks, profile = self.scene, self.ranks, self.profile
+        if scene.objective.joints:
+            key, joints = "numerics.objective_joints", scene.numerics.objective_joints
+            reason = "accuracy is measured for all joints together"
+            remedy = "Leave the joints out for this command"
+            raise InputError(key, joints, reason, remedy)
+        if not scene.clearance_joints():
+            reason = "the objective is 0 without clearance"
+            raise InputError("joints", "ideal", reason, "Give a joint clearance")
+        self._listener("compilation")
+        studied, case, _ = with_case(scene)
+        surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
+        self.add_motion()
+        self.add_spending()
+        with ranks.stage("integration"):
+            self.panel("integration", lambda: integration.measure(scene, profile, self.notify))
+        with ranks.stage("averaging"):
+            self.panel("averaging", lambda: averaging.measure(scene, profile))
+        self.add_study()
+        return self.content()
+
 
 FILE = "accuracy.nc"
-
-
-def measure(
-    scene: Scene,
-    ranks: Ranks,
-    profile: Profile,
-    notify: Notify = lambda text: None,
-    store: Checkpoint | None = None,
-    show: Callable[[Results], object] = lambda content: None,
-) -> Results:
-    """Measure what accuracy costs for a scene with a clearance joint at least; on root. Returns results of kind ``accuracy``.
-
-    `notify`, `show`: as of `Panels`; the store keeps finished work. Raises InputError if no joint has clearance, or the
-    objective is of some joints.
-    """
-    if scene.objective.joints:
-        key, joints = "numerics.objective_joints", scene.numerics.objective_joints
-        reason = "accuracy is measured for all joints together"
-        remedy = "Leave the joints out for this command"
-        raise InputError(key, joints, reason, remedy)
-    if not scene.clearance_joints():
-        reason = "the objective is 0 without clearance"
-        raise InputError("joints", "ideal", reason, "Give a joint clearance")
-    panels = Panels(scene, ranks, profile, notify, store, show)
-    notify("compilation")
-    studied, case, _ = with_case(scene)
-    surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
-    panels.add_motion()
-    panels.add_spending()
-    with ranks.stage("integration"):
-        panels.panel("integration", lambda: integration.measure(scene, profile, panels.notify))
-    with ranks.stage("averaging"):
-        panels.panel("averaging", lambda: averaging.measure(scene, profile))
-    panels.add_study()
-    return panels.content()
 
 
 def run_accuracy(
@@ -230,7 +215,7 @@ def run_accuracy(
         else:
             session.describe(scene)
             store = session.opened()
-            content = measure(scene, ranks, profile, notify, store, draw)
+            content = Panels(scene, ranks, profile, notify, store, draw).measured()
             content.attrs.update(session.attributes)
             dataset.write(content, place.output / FILE)
             shown.clear()  # all say now what they were made of
