@@ -339,10 +339,3 @@ def test_one_objective(seed):
     front = minimise(rosenbrock, [(-2, 2)] * 2, iterations=150, rng=rng)
     assert front.points.shape == (1, 2)
     assert np.allclose(front.points, 1.0, atol=1e-2)
-
-
-def test_start_designs_are_evaluated_first():
-    swarm = ParticleSwarm(
-        [(2, 4), (-1, 1)], 5, np.random.default_rng(0), start=[[2.5, 0.25], [4.0, -1.0]]
-    )
-    assert np.allclose(swarm.ask()[:2], [[2.5, 0.25], [4.0, -1.0]], rtol=0, atol=1e-15)

@@ -44,8 +44,7 @@ class ParticleSwarm:
     """A particle swarm that requests points to evaluate and receives their objectives.
 
     `bounds` (d, 2): lower and upper bound of each variable; `iterations`: number of `tell` calls, which sets the slope of the
-    inertia weight (k_max of eq. 23); `rng`: owned by the swarm from here on; `start` (k, d): known designs that replace the
-    first k random particles.
+    inertia weight (k_max of eq. 23); `rng`: owned by the swarm from here on.
     """
 
     def __init__(
@@ -54,10 +53,9 @@ class ParticleSwarm:
         iterations: int,
         rng: np.random.Generator,
         *,
-        settings: SwarmSettings | None = None,
-        start: ArrayLike | None = None,
+        settings: SwarmSettings = SwarmSettings(),
     ) -> None:
-        self.settings = SwarmSettings() if settings is None else settings
+        self.settings = settings
         self._lower, self._upper = np.array(bounds, dtype=float).T
         self.iterations = iterations
         self.iteration = 0
@@ -65,9 +63,6 @@ class ParticleSwarm:
         self._constrained = False  # whether a design broke a constraint
         shape = (self.settings.particles, len(self._lower))
         self._positions: Array = rng.random(shape)
-        if start is not None:
-            known = np.array(start, dtype=float)
-            self._positions[: len(known)] = (known - self._lower) / (self._upper - self._lower)
         self._velocities: Array = np.zeros(shape)
         self._personal_positions: Array = self._positions.copy()
         self._personal_values: Array = np.empty((shape[0], 0))
@@ -170,11 +165,8 @@ def minimise(
     iterations: int,
     rng: np.random.Generator,
     size: int = 100,
-    settings: SwarmSettings | None = None,
-    start: ArrayLike | None = None,
+    settings: SwarmSettings = SwarmSettings(),
 ) -> Front:
     """Run a swarm to its end (`hpcclear.statistics.search.asking.minimise`); other parameters and errors: `ParticleSwarm`."""
-    settings = SwarmSettings() if settings is None else settings
-    search = ParticleSwarm(bounds, iterations, rng, settings=settings, start=start)
     task = SearchTask(np.array(bounds, dtype=float), 0, rng, iterations, settings)
-    return asking.minimise(search, function, task, size)
+    return asking.minimise(swarm(task), function, task, size)
