@@ -39,7 +39,7 @@ def test_the_front_of_dtlz2_is_found_with_the_evaluations_of_a_swarm(name):
         return dtlz2(points)
 
     found = search(name, counted)
-    assert sum(map(len, asked)) == found.evaluations == 2000
+    assert sum(map(len, asked)) == 2000
     assert all(((points >= 0.0) & (points <= 1.0)).all() for points in asked)
     assert hypervolume(found.values, np.full(3, 1.1)) > 0.69
     assert len(found.values) == 60
@@ -71,23 +71,24 @@ def test_constraints_are_handed_over_and_kept(name):
 
     found = search(name, line, bounds=UNIT[:3], objectives=2)
     assert (found.points[:, 0] + found.points[:, 1] >= 1.0).all()
-    assert found.infeasible == round(sum(broken) * 40)
-    assert found.infeasible > 0
+    assert sum(broken) > 0.0
     assert hypervolume(found.values, np.full(2, 1.1)) > 0.6  # 0.71 with endless points
 
 
 def test_designs_that_fail_stand_on_no_front():
+    failed = []
+
     def half(points):
         values = dtlz2(points)
+        failed.append((points[:, 0] > 0.5).sum())
         values[points[:, 0] > 0.5] = np.nan
         return values
 
     found = search("NSGA2", half)
-    assert 0 < found.failed < 1000  # it turns away from them
+    assert 0 < sum(failed) < 1000  # it turns away from them
     assert np.isfinite(found.values).all()
     assert (found.points[:, 0] <= 0.5).all()
     nothing = search("NSGA3", lambda points: np.full((len(points), 3), np.nan))
-    assert nothing.failed == nothing.evaluations == 2000
     assert len(nothing.values) == 0
 
 

@@ -71,7 +71,6 @@ def test_full_budget_hypervolume(name):
     reached = []
     for seed in range(1, 6):
         front = run(function, dimensions, seed, 250)
-        assert front.evaluations == 25_000
         assert len(front.points) == 100
         reached.append(moocore.hypervolume(front.values, 1.1))
     assert np.median(reached) >= least
@@ -274,10 +273,16 @@ def test_a_first_feasible_point_is_put_together_of_coordinates(shift):
 
 
 def test_no_feasible_point_is_said_and_not_invented():
-    front = run(lambda x: (zdt1(x), np.full(len(x), 0.25)), 5, 1, 10)
+    asked = []
+
+    def broken(x):
+        asked.append(len(x))
+        return zdt1(x), np.full(len(x), 0.25)
+
+    front = run(broken, 5, 1, 10)
     assert front.points.shape == (0, 5)
     assert len(front.values) == 0
-    assert (front.evaluations, front.infeasible) == (1000, 1000)
+    assert sum(asked) == 1000
 
 
 def test_bounds_hold_for_every_point_asked():
@@ -303,7 +308,6 @@ def test_same_seed_same_bits_and_other_seed_other_bits():
 
 def test_failed_points_never_enter_the_archive(shift):
     front = run(lambda x: np.where(x[:, :1] > 0.5, np.nan, zdt1(x)), 5, 1 + shift, 60)
-    assert front.failed > 0
     assert np.isfinite(front.values).all()
     assert front.points[:, 0].max() <= 0.5
     f1 = np.linspace(0, 0.5, 300)
@@ -317,7 +321,6 @@ def test_infinite_values_and_nan_violations_are_infeasible():
         rng=np.random.default_rng(0), settings=SwarmSettings(particles=4),
     )  # fmt: skip
     assert front.values.tolist() == [[1.0, 1.0]]
-    assert (front.failed, front.infeasible) == (2, 1)
 
 
 def test_failed_points_still_lead_by_their_violation():

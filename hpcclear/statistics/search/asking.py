@@ -110,22 +110,21 @@ class _Met:
     """What a search has met."""
 
     def __init__(self, task: SearchTask) -> None:
-        self.task, self.objectives = task, task.objectives
+        self.objectives = task.objectives
         nothing = np.empty((0, len(task.bounds))), np.empty((0, task.objectives))
         self.archive = Archive(task.settings.archive_capacity, *nothing)
         self.earlier = self.archive.values
-        self.evaluations = self.failed = self.infeasible = 0
+        self.evaluations = 0
+        self._constrained = False  # whether a design broke a constraint
         self._late = (task.iterations - max(1, task.iterations // 10)) * task.particles
 
     def add(self, designs: Array, values: Array, broken: Array) -> None:
         """Take in evaluated designs."""
         self.objectives = values.shape[1]
-        failed = ~np.isfinite(values).all(axis=1)
         feasible = broken == 0.0
         self.archive.add(designs[feasible], values[feasible])
         self.evaluations += len(designs)
-        self.failed += int(failed.sum())
-        self.infeasible += int((~failed & ~feasible).sum())
+        self._constrained |= bool((np.isfinite(values).all(axis=1) & ~feasible).any())
         if self.evaluations <= self._late:
             self.earlier = self.archive.values
 
@@ -134,17 +133,11 @@ class _Met:
         values, objectives = self.archive.values.reshape(-1, self.objectives), self.objectives
         if size < objectives:
             raise InputError("size", size, f"a front of {objectives} objectives", "Request more.")
-        kept = (best_subset if self.infeasible else cut)(values, size)
+        kept = (best_subset if self._constrained else cut)(values, size)
         if len(kept):
             kept = kept[np.lexsort(values[kept].T[::-1])]
-        return Front(
-            points=self.archive.positions[kept],
-            values=values[kept],
-            evaluations=self.evaluations,
-            failed=self.failed,
-            infeasible=self.infeasible,
-            gain=relative_gain(self.earlier, values),
-        )
+        gain = relative_gain(self.earlier, values)
+        return Front(self.archive.positions[kept], values[kept], gain)
 
 
 def _asked(search: Search, name: str, bounds: Array) -> Array:

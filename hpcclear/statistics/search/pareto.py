@@ -14,17 +14,12 @@ from hpcclear.base.cached import cached
 class Front:
     """Result of a search: ``points (k, d)``, ``values (k, m)`` by rising first objective.
 
-    `failed` counts points whose objectives were not finite, `infeasible` the others that broke a
-    constraint; both are part of `evaluations`. `gain` is the share of the hypervolume won in the
-    last tenth of the iterations, NaN if unknown. A search with little gain may still sit on a local
-    front: compare several seeds.
+    `gain` is the share of the hypervolume won in the last tenth of the iterations, NaN if unknown. A
+    search with little gain may still sit on a local front: compare several seeds.
     """
 
     points: Array
     values: Array
-    evaluations: int
-    failed: int
-    infeasible: int
     gain: float
 
 
