@@ -223,7 +223,7 @@ def test_prediction_does_not_depend_on_the_batch(either):
 
 def test_round_trip_is_bitwise(either):
     model = either
-    whole = Piecewise((model,), *np.ones((3, 1)))
+    whole = Piecewise((model,), np.ones(1))
     arrays = {name: np.copy(array) for name, array in arrays_of(whole).items()}
     ((again,),) = (one.leaves for one in models_in(arrays).values())
     places = draw(100, 5)
@@ -362,7 +362,6 @@ def test_recursion_cuts_where_the_kink_is(shift):
     assert pieces.accepted.all()
     assert len(pieces.leaves) > 1
     assert all((leaf.lower[1], leaf.upper[1]) == (0.0, 2.0) for leaf in pieces.leaves)
-    assert (pieces.r2 >= 0.999).all()
     assert len(evaluate.calls) < 6  # one call a generation
     places = draw(500, 13 + shift, SQUARE)
     at_least(accuracy(kinked(places), pieces.predict(places)).r2, 0.999)

@@ -191,7 +191,7 @@ def test_moments_are_averages_of_predictions_or_its_own():
 
     found = []
     for leaf in (linear, own):
-        model = Piecewise((leaf,), np.ones(1), np.zeros(1), np.ones(1, bool))
+        model = Piecewise((leaf,), np.ones(1, bool))
         random = [RandomVariable("x2", Uniform(5e-5, 5e-5))]
         found.append(
             RobustObjective(model, ("x1",), random, draws=lambda _: draws)(np.array([[1.0]]))[0]

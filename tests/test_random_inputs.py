@@ -272,7 +272,7 @@ def _model(scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTI
         inputs=region.lower + unit * (region.upper - region.lower), values=np.zeros(40), alpha=rng.normal(size=40),
         kernel=kernel,
     )  # fmt: skip
-    return Piecewise((leaf,), np.ones(1), np.zeros(1), np.array([True]))
+    return Piecewise((leaf,), np.array([True]))
 
 
 @pytest.mark.parametrize(

@@ -219,7 +219,7 @@ def pieces():
         (upper if u == 0 else lower)[1] = 0.03
         (upper if c == 0 else lower)[3] = 5e-4
         leaves.append(surrogate(lower=lower, upper=upper, seed=k))
-    return Piecewise(tuple(leaves), np.ones(4), np.zeros(4), np.ones(4, bool))
+    return Piecewise(tuple(leaves), np.ones(4, bool))
 
 
 def test_piecewise_model_is_averaged_over_draws():

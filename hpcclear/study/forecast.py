@@ -96,8 +96,7 @@ class _Rehearsal(Simulations):
     @property
     def model(self) -> Piecewise:
         """The surrogate of f."""
-        unknown = np.full(1, np.nan)
-        return Piecewise((self._models[0],), unknown, unknown, np.zeros(1, bool))
+        return Piecewise((self._models[0],), np.zeros(1, bool))
 
     def _places(self, points: Points) -> Array:
         """Inputs of the surrogates, within their bounds."""

@@ -120,13 +120,12 @@ def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
     points = to_coordinates(run.scene, names, values[:, columns])
     inside = (points >= model.lower) & (points <= model.upper)
     rows = here.all(axis=1) & inside.all(axis=1)
-    unknown, accepted = np.full(1, np.nan), np.zeros(1, bool)
     bounds, found = np.column_stack([model.lower, model.upper]), []
     fitted = [coordinate(study.variable(name)) for name in names]
     for name, one in zip(study.further, responses[1:], strict=True):
         data, rng = (points[rows], one[rows], bounds), run.rng("kriging", name)
         leaf = method_of(run.scene).fit(*data, rng=rng, names=fitted)
-        found.append(Piecewise((leaf,), unknown, unknown, accepted))
+        found.append(Piecewise((leaf,), np.zeros(1, bool)))
     return found
 
 

@@ -21,13 +21,11 @@ Leaf = Kriging | Regression
 class Piecewise:
     """Models of one kind on boxes that tile a domain, all with the same names.
 
-    `r2`, `rmae`: accuracy of each on its own test points (NaN where the test values do not vary); `accepted`: whether it met
-    the targets, a False is the best within the allowed number of pieces; (leaves,) each.
+    `accepted` (leaves,): whether each met the targets on its own test points, a False is the best within the allowed number of
+    pieces.
     """
 
     leaves: tuple[Leaf, ...]
-    r2: np.ndarray
-    rmae: np.ndarray
     accepted: np.ndarray
 
     @property

@@ -56,9 +56,8 @@ def arrays_of(model: Piecewise) -> dict[str, np.ndarray]:
     """All of a model, for `models_in` of a checkpoint: it predicts the same to the last bit."""
     leaves, names = model.leaves, model.names
     columns = regression.RESTORED if isinstance(leaves[0], Regression) else None
-    judged = {"r2": model.r2, "rmae": model.rmae, "accepted": model.accepted}
     family = np.full(len(leaves), " ".join(names))
-    about = {**judged, "family": family, "parameter": np.array(names)}
+    about = {"accepted": model.accepted, "family": family, "parameter": np.array(names)}
     return rows_of(leaves, list(names), columns) | about
 
 
@@ -81,8 +80,7 @@ def _family(arrays: Mapping[str, np.ndarray], family: str, rows: list[int]) -> P
         raise _unfit(family)
     own = ({name: one[row] for name, one in arrays.items() if len(one) > row} for row in rows)
     leaves = tuple(_leaf(one, family, known) for one in own)
-    r2, rmae, accepted = (arrays[name][rows] for name in ("r2", "rmae", "accepted"))
-    return Piecewise(leaves, r2, rmae, accepted.astype(bool))
+    return Piecewise(leaves, arrays["accepted"][rows].astype(bool))
 
 
 def _unfit(family: str) -> InputError:

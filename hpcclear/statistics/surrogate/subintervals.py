@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
-from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
+from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
 from hpcclear.statistics.surrogate.response_surface import Evaluate, latin_hypercube
@@ -69,7 +69,7 @@ def fit_subintervals(
     nothing = np.empty((0, len(domain))), np.empty(0)
     whole = _Box(domain, rng.spawn(1)[0], *nothing, *nothing)
     whole.wanted = [snap(latin_hypercube(n, domain, whole.rng)) for n in counts]
-    pending, done = [whole], list[tuple[Leaf, Accuracy, bool]]()
+    pending, done = [whole], list[tuple[Leaf, bool]]()
     while pending:
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
@@ -87,12 +87,11 @@ def fit_subintervals(
                     half.wanted = [snap(latin_hypercube(n, half.bounds, half.rng)) for n in counts]
                     following.append(half)
             else:
-                done.append((model, reached, accepted))
+                done.append((model, accepted))
         pending = following
     done.sort(key=lambda one: tuple(one[0].lower))
-    models, judged, good = zip(*done, strict=True)
-    r2, rmae = (np.array([getattr(one, name) for one in judged]) for name in ("r2", "rmae"))
-    return Piecewise(models, r2, rmae, np.array(good))
+    models, good = zip(*done, strict=True)
+    return Piecewise(models, np.array(good))
 
 
 def _evaluate_wanted(evaluate: Evaluate, boxes: list[_Box]) -> None:
