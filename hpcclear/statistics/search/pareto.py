@@ -74,15 +74,8 @@ class Archive:
 
 
 def hypervolume(values: Array, reference: Array) -> float:
-    """Hypervolume dominated by `values (k, m)` below `reference (m,)`; exact to five objectives.
-
-    Beyond, moocore's approximation Rphi-FWE+, which is deterministic. An empty set has none.
-    """
-    if values.size == 0:
-        return 0.0
-    if len(reference) <= 5:
-        return float(moocore.hypervolume(values, reference))
-    return float(moocore.hv_approx(values, reference, method="Rphi-FWE+"))
+    """Hypervolume dominated by `values (k, m)` below `reference (m,)`. An empty set has none."""
+    return float(moocore.hypervolume(values, reference)) if values.size else 0.0
 
 
 def relative_gain(before: Array, now: Array) -> float:
