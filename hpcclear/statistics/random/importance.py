@@ -329,10 +329,6 @@ def weighted(f: Array, weights: Array, level: float, confidence: float) -> Limit
     if value <= 0.0:
         return Limited(0.0, shifts, 0.0, 1.0)
     error = float(spread(shifts[None])[0])
-    factor = reach(error / value, confidence, int((counts > 0).sum()))
+    reach = error / value * WIDER * student(confidence, int((counts > 0).sum()) - 1)
+    factor = float(np.exp(min(reach, 500.0)))
     return Limited(value, shifts, value / factor, min(value * factor, 1.0))
-
-
-def reach(error: float, confidence: float, repeats: int = REPEATS) -> float:
-    """Upper end of the interval of a probability over it, from its relative standard error."""
-    return float(np.exp(min(error * WIDER * student(confidence, repeats - 1), 500.0)))
