@@ -9,10 +9,10 @@ import numpy as np
 
 from hpcclear.results import dataset
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.truth import scattered
 
 PAIRS = 32
 """Samples of a design that are simulated twice: the variance of pairs is known to a quarter of itself."""
@@ -32,11 +32,7 @@ def designs(study: Study) -> int:
 def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
     """Standard deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where
     all failed. Raises InputError if all simulations fail."""
-    batches = []
-    for one in choices:
-        random, design = run.study.case(one.case).random, dict(one.design)
-        points = monte_carlo(run.scene, PAIRS, random=random, design=design, purpose="chaos")
-        batches.append(run.simulations.filled(points.names, points.values))
+    batches = [scattered(run, one, PAIRS, "chaos", None) for one in choices]
     values = np.stack([batch.values for batch in batches])
     perturbed = values * (1.0 + PERTURBATION)
     pairs = np.stack([values, perturbed], axis=2)  # (designs, PAIRS, 2, variables)
