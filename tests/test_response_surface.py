@@ -79,7 +79,6 @@ def test_measures_by_hand() -> None:
     assert reached.rmae == pytest.approx(1 / np.sqrt(3.5), rel=1e-14)
     assert reached.rmae_mean == pytest.approx(1 / 3, rel=1e-14)
     assert reached.rmse == pytest.approx(np.sqrt(0.5), rel=1e-14)
-    assert reached.n_test == 4
 
 
 def test_constant_test_values_have_no_r2_but_can_be_met() -> None:

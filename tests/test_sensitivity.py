@@ -72,7 +72,6 @@ def test_midpoint_sensitivity_of_a_cubic_is_exact_at_every_clearance() -> None:
     np.testing.assert_allclose(found.r2, 1, atol=1e-12)
     np.testing.assert_allclose(found.rmae, 0, atol=1e-10)
     assert (found.degrees_of_freedom == 35).all()
-    assert (found.failed == 0).all()
     verdict = convergence_intervals(found)
     assert not verdict.found.any()  # one interval shows no convergence
 
@@ -149,14 +148,13 @@ def test_still_changing_is_told_from_not_distinguishable() -> None:
     assert np.isnan(best_estimates(found, verdict)[0][:, 0]).all()
 
 
-def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
+def test_failed_simulations_are_left_out_and_a_starved_surface_is_nan() -> None:
     design = design_intervals(BOUNDS, CLEARANCES, np.random.default_rng(5), IntervalSettings())
     values = curved(design.points).reshape(6, 3, 50)
     values[0, 0, :5] = np.nan  # enough are left
     values[1, 1, :40] = np.nan  # 5 training points for 10 terms
     values[2, 2, 46:] = np.nan  # one test point
     found = analyse_intervals(design, values.ravel())
-    assert (found.failed[0, 0], found.failed[1, 1], found.failed[2, 2]) == (5, 40, 4)
     assert found.degrees_of_freedom[0, 0] == 30
     assert np.isnan(found.sensitivity[1, 1]).all()
     assert np.isnan(found.standard_error[1, 1]).all()
@@ -281,7 +279,6 @@ def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: in
     np.testing.assert_allclose(found.first, variances / variances.sum(), atol=2e-3)
     np.testing.assert_allclose(found.total, variances / variances.sum(), atol=2e-3)
     assert found.variance == pytest.approx(variances.sum(), rel=1e-2)
-    assert found.mean == pytest.approx(1e6 + 6.5, rel=1e-8)
 
 
 def test_failed_rows_are_dropped_whole() -> None:

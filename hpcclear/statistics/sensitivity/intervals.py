@@ -85,8 +85,6 @@ class SensitivityHistory:
 
     intervals: Array
     """Shape (k, d, 2): bounds of the variables, the widest first."""
-    clearances: Array
-    """Shape (c,)."""
     sensitivity: Array
     standard_error: Array
     """sensitivity and standard_error, shape (k, c, d): derivatives at the midpoint, in units of f per unit of the variable."""
@@ -96,9 +94,7 @@ class SensitivityHistory:
     leave_one_out_r2: Array
     """Shape (k, c)."""
     degrees_of_freedom: Integers
-    failed: Integers
-    """degrees_of_freedom and failed, shape (k, c): of the residuals (0 where no surface was fitted); simulations that
-    failed."""
+    """Of the residuals, shape (k, c); 0 where no surface was fitted."""
     order: int
     """Total order of the surfaces."""
 
@@ -135,8 +131,8 @@ def design_intervals(
 def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityHistory:
     """Fit a surface for every interval and clearance and take its midpoint derivatives (eq. 14).
 
-    `values` (n,): f at `design.points`; those that are not finite are failed simulations, counted in `failed`. A surface left
-    with too few points is NaN in the history. Raises InputError if no surface at all can be fitted.
+    `values` (n,): f at `design.points`; those that are not finite are failed simulations. A surface left with too few points is
+    NaN in the history. Raises InputError if no surface at all can be fitted.
     """
     x, y = design.by_surface(values)
     shape = y.shape[:2]
@@ -151,10 +147,10 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
             freedom[k, c] = surface.degrees_of_freedom
         if tested is not None:
             r2[k, c], rmae[k, c] = tested.r2, tested.rmae
-    failed = np.count_nonzero(~np.isfinite(y), axis=2)
     if not freedom.any():
+        failed = int(np.count_nonzero(~np.isfinite(y)))
         reason = "too many simulations failed to fit a surface"
         remedy = "look at their status, correct the cause, or use more points"
-        raise InputError("values", int(failed.sum()), reason, remedy)
-    where, order = (design.intervals, design.clearances), design.settings.order
-    return SensitivityHistory(*where, slope, error, r2, rmae, left_out, freedom, failed, order)
+        raise InputError("values", failed, reason, remedy)
+    surfaces = r2, rmae, left_out, freedom, design.settings.order
+    return SensitivityHistory(design.intervals, slope, error, *surfaces)

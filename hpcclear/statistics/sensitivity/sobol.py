@@ -38,9 +38,8 @@ class SobolIndices:
     first_interval: Array
     total_interval: Array
     """first_interval and total_interval, shape (d, 2); NaN where a single replicate is left."""
-    mean: float
     variance: float
-    """mean and variance: of f over the box, in its unit and its square."""
+    """Of f over the box, in its squared unit."""
 
 
 def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Array:
@@ -77,7 +76,7 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
     first, total = indices = _indices(y)
     reach = _jackknife(y, replicate) * student(confidence, max(len(np.unique(replicate)) - 1, 1))
     alone, whole = np.stack([indices - reach, indices + reach], axis=-1)
-    return SobolIndices(first, total, alone, whole, float(y[:2].mean()), float(y[:2].var()))
+    return SobolIndices(first, total, alone, whole, float(y[:2].var()))
 
 
 def _jackknife(y: Array, replicate: Integers) -> Array:

@@ -29,7 +29,7 @@ ROUNDING = 32.0 * np.finfo(np.float64).eps
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Accuracy on `n_test` test points that counted; see the module's table for the formulas.
+    """Accuracy on test points; see the module's table for the formulas.
 
     `r2`, `r2_explained`, `rmae` and `rmae_mean` have no unit, and are NaN where the test values do not vary (or, for
     `rmae_mean`, have mean 0); `rmse`: root mean square error, `scale`: largest magnitude of the test values, both in the unit
@@ -41,7 +41,6 @@ class Accuracy:
     rmae: float
     rmae_mean: float
     rmse: float
-    n_test: int
     constant: bool
     scale: float
 
@@ -83,7 +82,6 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
         rmae=float(worst / deviation),
         rmae_mean=worst / abs(mean) if mean != 0.0 else float("nan"),
         rmse=float(np.sqrt(np.mean(error**2))),
-        n_test=int(true.size),
         constant=constant,
         scale=scale,
     )
