@@ -198,7 +198,7 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     every = (result[key][rows, :, at].T for key in ("best_sensitivity", "uncertainty"))
     slope, error = map(np.ascontiguousarray, every)
     fraction = run.study.sensitivity.influence
-    chosen = select_influential(names, slope, error, np.ones(len(names)), fraction=fraction)
+    chosen = select_influential(names, slope, error, fraction=fraction)
     influence = np.full(len(run.study.names), np.nan)
     for column, place in enumerate(at):
         known = chosen.effect[:, column]

@@ -38,9 +38,8 @@ class Selection(NamedTuple):
 
 def select_influential(
     names: Sequence[str],
-    sensitivity: ArrayLike,
-    standard_error: ArrayLike,
-    lengths: ArrayLike,
+    effects: ArrayLike,
+    errors: ArrayLike,
     *,
     fraction: float = 0.1,
     confidence: float = 0.99,
@@ -48,14 +47,11 @@ def select_influential(
 ) -> Selection:
     """Rank the variables and select those with great influence (rule: module text).
 
-    `names`: variable of each of m columns, a name may come more than once; `sensitivity` (c, m): derivatives at each
-    clearance, in units of f per unit of the variable, NaN for no estimate; `lengths` (m,): of the global intervals, in the
-    unit of each variable. `fraction`: of the largest effect, `share`: of the clearances, both in (0, 1]; each comparison is
-    two-sided.
+    `names`: variable of each of m columns, a name may come more than once; `effects` (c, m): derivatives at each clearance
+    times the lengths of the global intervals, NaN for no estimate, and their standard `errors`. `fraction`: of the largest
+    effect, `share`: of the clearances, both in (0, 1]; each comparison is two-sided.
     """
-    slope, error = np.asarray(sensitivity, float), np.asarray(standard_error, float)
-    length = np.asarray(lengths, float)
-    effect, effect_error = np.abs(slope) * length, error * length
+    effect, effect_error = np.abs(np.asarray(effects, float)), np.asarray(errors, float)
     known = np.isfinite(effect) & np.isfinite(effect_error)
     effect, effect_error = np.where(known, effect, np.nan), np.where(known, effect_error, np.nan)
     margin = float(ndtri(0.5 + confidence / 2.0)) * effect_error
