@@ -1,7 +1,6 @@
 """Response surfaces, first-order sensitivities against clearance, and global indices."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -131,10 +130,8 @@ def _layouts(study: Study) -> list[IntervalSettings]:
         order = settings.together_order if together else settings.order
         points = settings.together_samples if together else settings.samples
         tests = max(settings.test_samples, 20) if together else settings.test_samples
-        sizes = {"n_points": points, "n_test": tests, "order": order}
-        chosen = settings.chooses(len(names), order, points)
-        made = partial(IntervalSettings, steps=settings.rounds, shrink=settings.shrink)
-        found.append(made(**sizes, chosen=chosen))
+        surface = points, tests, order, settings.chooses(len(names), order, points)
+        found.append(IntervalSettings(settings.rounds, settings.shrink, *surface))
     return found
 
 
