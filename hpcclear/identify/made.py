@@ -46,10 +46,9 @@ def write_made(
     first = np.ceil(turns[0] + float(found.attrs["transient_turns"]) / cycle - 1e-6)
     places = first + np.arange(revolutions * samples + 1) / samples
     rng = np.random.default_rng([seed, 0x6D6164])
-    columns = [360.0 * cycle * places]
+    sense = -1.0 if found["crank_angle"][-1] < found["crank_angle"][0] else 1.0
+    columns = [sense * 360.0 * cycle * places]
     headings = ["crank_angle [deg]"]
-    clockwise = found["crank_angle"][-1] < found["crank_angle"][0]
-    columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
         one = signal(found, name, "signal")
         if one.counted:  # whole events since the sample before, which have no noise

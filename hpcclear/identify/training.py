@@ -1,7 +1,7 @@
 """The ensemble over the prior: machines as they may be, each simulated once, with the spectra of all signals."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -83,5 +83,4 @@ def ensemble_of(
         reason = f"{int((~good).sum())} of {members} simulations over the bounds failed"
         raise InputError("--unknown", members, reason, "Narrow the bounds, or run hpcclear check")
     count = scene.numerics.averaged_revolutions
-    made = Ensemble(inputs, places, tuple(names), whole, count, int((~good).sum()))
-    return replace(made, places=places[good], spectra=whole[good])
+    return Ensemble(inputs, places[good], tuple(names), whole[good], count, int((~good).sum()))
