@@ -15,7 +15,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.judging import objective
-from hpcclear.dynamics.layout import views
 from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
 from hpcclear.dynamics.setup.parameters import parameters
@@ -104,7 +103,7 @@ def kernel_method(
         par = parameters(here, neighbours(here, designs))
         start = start_states(here, par)
         copies = -(-2 * width // designs) if width > 1 else 1
-        par, start = np.tile(par, (copies, 1)), views.Start(np.tile(start.rows, (copies, 1)))
+        par, start = np.tile(par, (copies, 1)), Start(np.tile(start.rows, (copies, 1)))
         Lanes(problem, width).step(1)  # without samples it only compiles
         return (lambda: _kernel_outcome(here, problem, width, par, start, designs)), 1.0 / len(par)
 
@@ -112,7 +111,7 @@ def kernel_method(
 
 
 def _kernel_outcome(
-    scene: Scene, problem: Problem, width: int, par: Array, start: views.Start, designs: int
+    scene: Scene, problem: Problem, width: int, par: Array, start: Start, designs: int
 ) -> TurnOutcome:
     outcome = Lanes(problem, width).run(par, start)[:designs]
     n = problem.coordinates

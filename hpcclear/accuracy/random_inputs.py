@@ -68,8 +68,7 @@ def measure(
     except InputError:  # inputs derived from others have none, nor has what is averaged over draws
         closed = np.full(len(MOMENTS), np.nan)
     sizes = np.array(profile.draws, np.int64)
-    error = np.full((len(ESTIMATES), len(MOMENTS), len(sizes)), np.nan)
-    lower, upper = error.copy(), error.copy()
+    error, lower, upper = np.full((3, len(ESTIMATES), len(MOMENTS), len(sizes)), np.nan)
     seconds = np.full((len(ESTIMATES), len(sizes)), np.nan)
     rng = generator(scene.required_study.seed, "accuracy", "draws")
     for k, size in enumerate(sizes):
