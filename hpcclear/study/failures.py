@@ -77,7 +77,6 @@ class Failures:
     def draw(self, choices: Sequence[Choice], rows: Sequence[int], length: int) -> None:
         """Take so many weighted draws of each repeat of some designs: the same of all."""
         for k, goal in enumerate(self.goals if rows else ()):
-            assert goal.limit is not None  # by validation
             u = self.densities[k].draw(length * importance.REPEATS, self._rng)
             weights, where = self.densities[k].weights(u), [(choices[row], u) for row in rows]
             for row, values in zip(rows, rare.simulated(self._run, where, "search"), strict=True):

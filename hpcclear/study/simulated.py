@@ -1,7 +1,5 @@
-"""The designs that a search has simulated, and what they come to: by few simulations, and by what a surrogate says of more.
-
-Sources: of what a surrogate explains (control variates) P. Glasserman, "Monte Carlo Methods in Financial Engineering" (2003),
-section 4.1, doi:10.1007/978-0-387-21617-1.
+"""The designs that a search has simulated, and what they come to: by few simulations, and by what a surrogate says of more (as
+a control variate; source: `hpcclear.study.guesses`).
 """
 
 import math

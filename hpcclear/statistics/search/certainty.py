@@ -67,9 +67,8 @@ class Compared:
             best = self.best(objective)
             if self.traded[best, taken].all():
                 taken.append(best)
-        behind = (self._any_less & ~self._any_less.T)[self.known].any(
-            axis=0
-        )  # one that is nowhere worse
+        # one that is nowhere worse
+        behind = (self._any_less & ~self._any_less.T)[self.known].any(axis=0)
         rows = np.flatnonzero(self.known & ~behind)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)
