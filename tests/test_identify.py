@@ -350,16 +350,17 @@ def test_growth_has_a_rate_and_a_time_to_the_limit_with_intervals():
     np.testing.assert_allclose(times, [0.0, 10 * DAY, 30 * DAY])
     truth = 50e-6 + 1e-6 * times / DAY
     particles = truth[:, None, None] + 2e-6 * rng.standard_normal((3, 4000, 1))
-    rate, left = history(times, particles, 100e-6, rng)
+    good = np.ones(3, bool)
+    rate, left = history(times, particles, 100e-6, rng, good)
     assert rate[1, 0] * DAY == pytest.approx(1e-6, rel=0.02)
     expected = 1.96 * 2e-6 / np.sqrt(np.sum((times / DAY - 40.0 / 3.0) ** 2))
     assert (rate[2, 0] - rate[0, 0]) * DAY / 2 == pytest.approx(expected, rel=0.1)
     assert left[0, 0] < 20 * DAY < left[2, 0]
     assert left[1, 0] == pytest.approx(20 * DAY, rel=0.05)
-    shrinking = history(times, particles[::-1], 100e-6, rng)
+    shrinking = history(times, particles[::-1], 100e-6, rng, good)
     assert np.isinf(shrinking.time[1, 0])
-    assert history(times[:1], particles[:1], None, rng) is None
-    assert history(seconds_of((), 3), particles, None, rng) is None  # no date, no rate
+    assert history(times[:1], particles[:1], None, rng, good[:1]) is None
+    assert history(seconds_of((), 3), particles, None, rng, good) is None  # no date, no rate
 
 
 @pytest.mark.parametrize(

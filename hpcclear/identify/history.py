@@ -40,8 +40,7 @@ def seconds_of(dates: tuple[str, ...], count: int) -> Array:
 
 
 def history(
-    times: Array, particles: Array, limit: float | None, rng: np.random.Generator,
-    explained: Booleans | None = None,
+    times: Array, particles: Array, limit: float | None, rng: np.random.Generator, explained: Booleans,
 ) -> History | None:  # fmt: skip
     """Rate of growth, by least squares through posteriors (m, n, unknowns) at times (m,), s; None for fewer or unknown.
 
@@ -50,8 +49,7 @@ def history(
     that of the machine.
     """
     last = times[-1]
-    if explained is not None:
-        times, particles = times[explained], particles[explained]
+    times, particles = times[explained], particles[explained]
     if len(times) < 2 or np.isnan(times).any():
         return None
     drawn = np.stack([rng.permuted(one, axis=0) for one in particles])
