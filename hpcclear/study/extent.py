@@ -53,9 +53,7 @@ def certificate_samples(scene: Scene) -> int:
 
     Counted are the whole scene, each effect by itself and one set of them; never fewer than a first look needs.
     """
-    study = scene.study
-    if study is None:
-        return effects.SAMPLES
+    study = scene.required_study
     total = sum(_of_stages(scene).values()) if study.cases else study.samples
     share = CERTIFICATE_SHARE * total / _variants(scene)
     return int(min(max(share, effects.LEAST), effects.SAMPLES))
