@@ -29,20 +29,19 @@ class CalledEquations:
     """The equations of one design, `par` (PARAMETERS,) and `hpcclear.dynamics.setup.start`, for solvers that call them."""
 
     def __init__(self, problem: Problem, par: Array, start: Start) -> None:
-        n = problem.coordinates
-        self.n = n
+        self.n = problem.coordinates
         self.problem = problem
         self.par = par
         self.named = Parameters(par)
-        self.latched = problem.effects.latched is not None
-        self.free = problem.effects.torque is not None
         effects = problem.effects
+        self.latched = effects.latched is not None
+        self.free = effects.torque is not None
         self.size = effects.first + effects.joints  # places of joints whose gaps are integrated
-        self.start = np.concatenate([start.state(n), np.zeros(self.size)])
+        self.start = np.concatenate([start.state(self.n), np.zeros(self.size)])
         self.contacts = start.contacts.copy()
         self.origin = start
-        self._head = problem.motion(problem.effects, 1).address, problem.tables
-        self._seen = new_seen(n, par, self.size)
+        self._head = problem.motion(effects, 1).address, problem.tables
+        self._seen = new_seen(self.n, par, self.size)
 
     def __call__(self, time: float, y: Array) -> Array:
         """dy/dt, shape (2 n + joints,)."""
@@ -157,11 +156,9 @@ def solve_turn(
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
     here = CalledEquations(one.problem, one.par, one.origin)  # at its start
     start, period = one.start.copy(), float(one.named.period)
-    effects = one.problem.effects
-    joints = list(at.places_of(effects))
+    joints = list(at.places_of(one.problem.effects))
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
-    end = np.inf if one.free else period
-    limit = 20.0 * period if one.free else end
+    limit = 20.0 * period if one.free else period
     turn_end = float(one.named.turn_end)
     atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
     atol = np.append(atol, one.size * [rtol * 1e-3 * period])
