@@ -104,10 +104,6 @@ class Browser:
         )
         self._ask("POST", "/url", {"url": page.resolve().as_uri()})
 
-    def visit(self, address: str) -> None:
-        """Load a page by its address."""
-        self._ask("POST", "/url", {"url": address})
-
     def run(self, script: str) -> Any:
         """The value that a script returns."""
         return self._ask("POST", "/execute/sync", {"script": script, "args": []})

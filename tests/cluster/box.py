@@ -186,10 +186,6 @@ class Box:
         """Pull the plug of a node's network."""
         self._in_switch(f"ip link set p{node.name} down")
 
-    def mend(self, node: Node) -> None:
-        """Put it back."""
-        self._in_switch(f"ip link set p{node.name} up")
-
     def _plug(self, node: Node) -> None:
         port = f"p{node.name}"
         self._in_switch(
