@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from margins import at_least, at_most
+from refusals import refused
 from scipy import stats
 from scipy.integrate import quad
 from sklearn.gaussian_process.kernels import Matern
@@ -202,9 +203,8 @@ def test_derived_inputs_agree_with_a_fine_rule_and_with_samples():
 
 def test_derived_support_must_stay_inside():
     place = np.array([[1.1, 0.0, 1.5e-4]])  # I down to 0.5e-4, m up to 1.15: r = 4.3e-5 < 5e-5
-    with pytest.raises(InputError, match="does not extrapolate") as caught:
+    with refused("r", match="does not extrapolate") as caught:
         in_ratio()(place)
-    assert caught.value.key == "r"
     assert caught.value.value == pytest.approx(0.5e-4 / 1.15)
 
 
@@ -240,20 +240,17 @@ def test_support_must_stay_inside_the_domain():
     for column, value in [(0, 1.04), (1, 0.21), (2, 1.4e-4), (0, np.nan)]:
         outside = place.copy()
         outside[0, column] = value
-        with pytest.raises(InputError, match="does not extrapolate") as caught:
+        with refused(DESIGN[column], match="does not extrapolate"):
             objective(outside)
-        assert caught.value.key == DESIGN[column]
     wide = RobustObjective(surrogate(), DESIGN, (RandomVariable("C", Uniform(6.45e-4, 3.55e-4)),))
-    with pytest.raises(InputError, match="does not extrapolate") as caught:
+    with refused("C", match="does not extrapolate"):
         wide(place)
-    assert caught.value.key == "C"
 
 
 def test_an_input_over_many_length_scales_is_refused():
     rough = surrogate(lengths=(1.0, 1.0, 1.0, 0.01))
-    with pytest.raises(InputError, match="length scales") as caught:
+    with refused("C", match="length scales"):
         RobustObjective(rough, DESIGN, UNIFORM[:1])
-    assert caught.value.key == "C"
 
 
 # A kernel that is no product of its inputs

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 from jsonschema import Draft202012Validator
 from patience import crowded
+from refusals import refused
 
 from hpcclear.base import units as scene_units
 from hpcclear.base.errors import InputError
@@ -170,15 +171,13 @@ def test_override(override: str, path: str, value: object) -> None:
     ],
 )
 def test_malformed_override_is_refused(override: str) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused("--set"):
         load_scene(SLIDER_CRANK, [override])
-    assert caught.value.key == "--set"
 
 
 def test_override_cannot_smuggle_in_a_second_key() -> None:
-    with pytest.raises(InputError) as caught:
+    with refused("mechanism.rod.mass"):
         load_scene(SLIDER_CRANK, ["mechanism.rod.mass=1\nvalue2=2"])
-    assert caught.value.key == "mechanism.rod.mass"
 
 
 def test_c_drives_the_clearances_there_are() -> None:
@@ -265,9 +264,8 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
         "a\0b",
     ]
     for source in sources:
-        with pytest.raises(InputError) as caught:
+        with refused("scene file"):
             load_scene(source)
-        assert caught.value.key == "scene file"
 
 
 def test_symbolic_link_and_byte_order_mark_are_fine(tmp_path: Path, scene: Scene) -> None:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from planar_scenes import planar_scene
+from refusals import refused
 from scipy.integrate import solve_ivp
 from test_loads import INERTIA, PIN, START, angle_of, machine
 
 from hpcclear import load_scene, simulate
-from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.ensemble.api import as_points
 
@@ -183,15 +183,13 @@ def test_tables_against_the_time_come_from_files(tmp_path):
     ],
 )
 def test_loads_at_fault_are_named(load, key):
-    with pytest.raises(InputError) as told:
+    with refused(f"mechanism.{key}"):
         simulate(machine({"x": {"kind": "torque", "body": "pendulum", **load}}))
-    assert told.value.key == f"mechanism.{key}"
 
 
 def test_a_run_up_does_not_stop():
-    with pytest.raises(InputError) as told:
+    with refused("mechanism.drives.clock.speed_by_time"):
         run_up(speed_by_time=[[0, 1], [1, 0]])
-    assert told.value.key == "mechanism.drives.clock.speed_by_time"
 
 
 def test_a_motion_by_the_time_has_no_steady_mean():
@@ -200,9 +198,8 @@ def test_a_motion_by_the_time_has_no_steady_mean():
         "kick": {"kind": "torque", "body": "rocker", "torque_by_time": [[0.0, 0.0], [1.0, 1.0]]}
     }
     timed = scene.with_({"mechanism.loads": kick, "numerics.target_error": 0.05})
-    with pytest.raises(InputError) as told:
+    with refused("numerics.target_error"):
         evaluator_of(timed, as_points(timed, {"mechanism.joints.o2.clearance": [1e-4]}))
-    assert told.value.key == "numerics.target_error"
 
 
 def mirrored(side):
