@@ -1,6 +1,10 @@
 """Scenes of planar linkages from their tables."""
 
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.tables import plain
+
+KEPT = ("effects", "numerics", "output")
+"""Tables that are the same whatever the mechanism is written as."""
 
 
 def planar_scene(bodies, joints, drives, *, ground=None, loads=None, **tables) -> Scene:
@@ -10,3 +14,24 @@ def planar_scene(bodies, joints, drives, *, ground=None, loads=None, **tables) -
         mechanism["ground"] = {"points": ground}
     mechanism["loads"] = loads or {}
     return load_scene({"format_version": 2, "mechanism": mechanism, **tables})
+
+
+def written_out(scene: Scene) -> Scene:
+    """A slider-crank with clearance in both joints by its bodies and joints."""
+    bars = scene.slider_crank
+    joints = {
+        "main": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+        "guide": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
+    }
+    ends = {"crank_rod": ("crank.b", "rod.a"), "rod_slider": ("slider.pin", "rod.b")}
+    for name, (journal, bearing) in ends.items():
+        table = plain(getattr(scene.joints, name))
+        table["materials"] = {part: table.pop(part) for part in ("bearing", "journal")}
+        joints[name] = table | {"journal": journal, "bearing": bearing}
+    bodies = {
+        "crank": plain(bars.crank),
+        "rod": plain(bars.rod),
+        "slider": {"mass": bars.slider.mass, "points": {"pin": [0.0, 0.0]}},
+    }
+    kept = {name: table for name, table in scene.resolved().items() if name in KEPT}
+    return planar_scene(bodies, joints, {"motor": plain(scene.drive) | {"body": "crank"}}, **kept)

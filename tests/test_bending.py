@@ -7,7 +7,7 @@ import pytest
 import running
 from bending_by_lagrange import IdealSliderCrank, Rod
 from linkages import constant_speed, loose_pin, revolute, slide, torque_drive
-from planar_scenes import planar_scene
+from planar_scenes import planar_scene, written_out
 from refusals import refused
 from scipy.integrate import solve_ivp
 
@@ -20,7 +20,6 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import Body
 from hpcclear.scene.planar import BarBending
-from hpcclear.scene.tables import plain
 
 CRANK, LENGTH, MASS, SLIDER = 0.15, 0.3, 0.151104, 0.075552  # Simeon's
 UNIFORM = {"mass": MASS, "inertia": MASS * LENGTH**2 / 12, "length": LENGTH, "center": 0.5 * LENGTH}
@@ -477,33 +476,7 @@ def test_methods_agree():
 
 def test_the_slider_crank_written_as_a_linkage_is_the_same():
     scene = bending(rtol=1e-9)
-    bars = scene.slider_crank
-    joints = {}
-    for name, journal, bearing in (
-        ("crank_rod", "crank.b", "rod.a"), ("rod_slider", "slider.pin", "rod.b"),
-    ):  # fmt: skip
-        table = plain(getattr(scene.joints, name))
-        table["materials"] = {part: table.pop(part) for part in ("bearing", "journal")}
-        joints[name] = table | {"journal": journal, "bearing": bearing}
-    linkage = scene.resolved() | {
-        "format_version": 2,
-        "mechanism": {
-            "kind": "planar",
-            "bodies": {
-                "crank": plain(bars.crank),
-                "rod": plain(bars.rod),
-                "slider": {"mass": bars.slider.mass, "points": {"pin": [0, 0]}},
-            },
-            "joints": {
-                "axis": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
-                "guide": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
-                **joints,
-            },
-            "drives": {"motor": plain(scene.drive) | {"body": "crank"}},
-        },
-    }
-    del linkage["drive"], linkage["joints"]
-    one, other = simulate(scene), simulate(load_scene(linkage))
+    one, other = simulate(scene), simulate(written_out(scene))
     assert float(other["objective"]) == pytest.approx(float(one["objective"]), rel=1e-9)
     for name in ("mode_amplitude", "strain_energy", "kinetic_energy", "energy_residual"):
         size = np.abs(one["kinetic_energy" if "energy" in name else name]).max()

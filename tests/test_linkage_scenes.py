@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dense_linkage import Contact, Dense, comes_as
+from planar_scenes import written_out
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
@@ -108,40 +109,7 @@ def slider_crank_pair():
         ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1", "numerics.rtol=1e-9",
          "numerics.method=dormand-prince"),
     )  # fmt: skip
-    m, j = scene.slider_crank, scene.joints.crank_rod
-    material = {
-        "bearing": j.bearing.model_dump(), "journal": j.journal.model_dump()
-    }  # fmt: skip
-    play = {
-        "kind": "clearance", "clearance": j.clearance, "bearing_radius": j.bearing_radius,
-        "materials": material,
-    }  # fmt: skip
-    bars = {
-        name: {
-            "length": link.length, "mass": link.mass, "mass_center": link.mass_center,
-            "inertia": link.inertia,
-        }
-        for name, link in (("crank", m.crank), ("rod", m.rod))
-    }  # fmt: skip
-    joints = {
-        "main": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
-        "guide": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
-        "crank_rod": {**play, "journal": "crank.b", "bearing": "rod.a"},
-        "rod_slider": {**play, "journal": "slider.pin", "bearing": "rod.b"},
-    }
-    slider = {"mass": m.slider.mass, "points": {"pin": [0.0, 0.0]}}
-    drive = {"motor": {"kind": "constant-speed", "body": "crank", "speed": scene.drive.speed}}
-    kept = {key: value for key, value in scene.resolved().items() if key in ("effects", "numerics")}
-    planar = load_scene(
-        {
-            "mechanism": {
-                "kind": "planar", "bodies": {**bars, "slider": slider}, "joints": joints,
-                "drives": drive,
-            },
-            **kept,
-        }
-    )  # fmt: skip
-    return scene, planar
+    return scene, written_out(scene)
 
 
 def test_the_slider_crank_by_bodies_is_the_slider_crank():
