@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-import tomli_w
 from commands import run
 from refusals import refused
 from scipy.integrate import solve_ivp
-from test_wear import ROTOR
+from test_wear import QUICK, ROTOR, widening
 
 from hpcclear.base.asking import answered
 from hpcclear.base.outcome import Status
@@ -197,43 +196,27 @@ LIMIT, CYCLES = 1.2e-4, 1e9
 
 def scene(lives: int, **wear: object) -> str:
     """The rotor of `test_wear`, whose coefficient scatters, with a limit that it passes long before its cycles."""
-    content = {**ROTOR, "wear": {"cycles": CYCLES, "lives": lives, "tolerance": 1e-3, "points": 9, "copies": 2,
-                                 "limit": {"clearance": LIMIT}, **wear}}  # fmt: skip
-    content["numerics"] = {
-        **ROTOR["numerics"],
-        "rtol": 1e-8,
-        "transient_revolutions": 10,
-        "averaged_revolutions": 2,
-    }
+    followed = {"cycles": CYCLES, "lives": lives, "tolerance": 1e-3, "points": 9, "copies": 2,
+                "limit": {"clearance": LIMIT}, **wear}  # fmt: skip
     k = {
         "path": "mechanism.joints.main.wear.bearing.coefficient",
         "distribution": "uniform",
         "half_width": 5e-16,
     }
     variable = {"path": "mechanism.bodies.shaft.mass", "range": [0.5, 2.0]}
-    content["study"] = {"variables": {"m": variable}, "random": {"k": k}}
-    return tomli_w.dumps(content)
+    study = {"variables": {"m": variable}, "random": {"k": k}}
+    return load_scene(ROTOR).with_({"wear": followed, "study": study, **QUICK}).to_toml()
 
 
 def revolutions(k: float) -> float:
-    """To the limit, from Hertz' law by a fine integration, as `test_lives` has it."""
-    slope, softness = k / (2.0 * math.pi * 0.02 * 0.02), 2.0 * (1.0 - 0.3**2) / 2e11
-
-    def speed(_, c):
-        radius = 0.02 + c - NEW
-        stiffness = 4.0 / (3.0 * softness) * np.sqrt(radius * (radius - c) / c)
-        depth = (500.0 / stiffness) ** (2.0 / 3.0)
-        return slope * 500.0 * 2.0 * math.pi * (radius - c - 0.5 * depth)
+    """To the limit, from Hertz' law by a fine integration."""
 
     def over(_, c):
         return c[0] - LIMIT
 
     over.terminal = True
-    return float(
-        solve_ivp(speed, (0.0, CYCLES), [NEW], rtol=1e-10, atol=1e-16, events=over, max_step=1e5).t[
-            -1
-        ]
-    )
+    fine = {"rtol": 1e-10, "atol": 1e-16, "max_step": 1e5}
+    return float(solve_ivp(widening(k), (0.0, CYCLES), [NEW], events=over, **fine).t[-1])
 
 
 @pytest.fixture(scope="module")

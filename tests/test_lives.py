@@ -12,7 +12,7 @@ from refusals import refused
 from running import scene_with
 from scipy.integrate import solve_ivp
 from scipy.stats import binom
-from test_wear import ROTOR, WORN
+from test_wear import ROTOR, WORN, widening, worn
 
 from hpcclear.base.asking import answered
 from hpcclear.base.outcome import Flag, Status
@@ -239,25 +239,9 @@ def words(output: Path, *settings: str) -> list[str]:
 
 def test_a_linkage_wears_as_the_closed_form_says(tmp_path):
     """A journal that turns under a constant load; its rate falls with the clearance, as Hertz's law has it."""
-    import tomli_w
-
-    content = {**ROTOR, "wear": {"cycles": 2e6, "tolerance": 1e-4, "points": 3}}
-    content["mechanism"] = {**ROTOR["mechanism"]}
-    content["numerics"] = {**ROTOR["numerics"], "rtol": 1e-9}
-    file = tmp_path / "rotor.toml"
-    file.write_text(tomli_w.dumps(content), encoding="utf-8")
-    code, output = run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
-    assert code == 0, output
-    found = opened.read(tmp_path / "out.nc", "wear")
-    slope, softness = 1e-15 / (2.0 * math.pi * 0.02 * 0.02), 2.0 * (1.0 - 0.3**2) / 2e11
-
-    def speed(_, c):
-        radius = 0.02 + c - 1e-4  # only the bearing wears
-        stiffness = 4.0 / (3.0 * softness) * np.sqrt(radius * (radius - c) / c)
-        depth = (500.0 / stiffness) ** (2.0 / 3.0)
-        return slope * 500.0 * 2.0 * math.pi * (radius - c - 0.5 * depth)
-
-    truth = solve_ivp(speed, (0.0, 2e6), [1e-4], rtol=1e-11, atol=1e-16).y[0, -1]
+    wear = {"wear": {"cycles": 2e6, "tolerance": 1e-4, "points": 3}, "numerics.rtol": 1e-9}
+    found, _ = worn(tmp_path, load_scene(ROTOR).with_(wear))
+    truth = solve_ivp(widening(1e-15), (0.0, 2e6), [1e-4], rtol=1e-11, atol=1e-16).y[0, -1]
     assert truth > 1.3e-4
     assert float(found.clearance[0, -1, 0]) == pytest.approx(truth, rel=1e-6)
     grown = found.bearing_depth[0, -1, 0] + found.journal_depth[0, -1, 0]

@@ -85,16 +85,41 @@ ROTOR = {
 }  # fmt: skip
 
 
+QUICK = {
+    "numerics.rtol": 1e-8, "numerics.transient_revolutions": 10, "numerics.averaged_revolutions": 2,
+}  # fmt: skip
+"""Of the rotor's lives."""
+
+
+def sliding_radius(c):
+    """Radius at which the rotor slides, m, with a bearing that wear has widened to a clearance; the depth is Hertz's."""
+    radius, softness = 0.02 + c - 1e-4, 2.0 * (1.0 - 0.3**2) / 2e11
+    stiffness = 4.0 / (3.0 * softness) * np.sqrt(radius * (radius - c) / c)
+    depth = (500.0 / stiffness) ** (2.0 / 3.0)
+    return radius - c - 0.5 * depth
+
+
+def widening(coefficient):
+    """Growth of its clearance in a revolution, m, as an equation for scipy."""
+    slope = coefficient / (2.0 * math.pi * 0.02 * 0.02)
+    return lambda _, c: slope * 500.0 * 2.0 * math.pi * sliding_radius(c)
+
+
+def worn(folder, scene, *options):
+    """What `wear` writes of a scene, and what it prints."""
+    file = folder / "scene.toml"
+    file.write_text(scene.to_toml(), encoding="utf-8")
+    code, output = commands.run(["wear", str(file), "-o", str(folder / "out.nc"), *options], 0)
+    assert code == 0, output
+    return opened.read(folder / "out.nc", "wear"), output
+
+
 @pytest.mark.parametrize("revolutions", [10, 20])
 def test_a_journal_that_turns_under_a_constant_load_does_linear_work(revolutions):
     """F omega (R_J - d/2) for all the time; d is what Hertz's law says."""
     scene = load_scene(ROTOR).with_({"numerics.averaged_revolutions": revolutions})
     found = run(scene)
-    c, radius, force = 1e-4, 0.02, 500.0
-    softness = 2.0 * (1.0 - 0.3**2) / 2e11
-    stiffness = 4.0 / (3.0 * softness) * math.sqrt(radius * (radius - c) / c)
-    depth = (force / stiffness) ** (2.0 / 3.0)
-    power = force * 100.0 * (radius - c - 0.5 * depth)
+    power = 500.0 * 100.0 * sliding_radius(1e-4)
     assert float(found.out.sliding_power[0]) == pytest.approx(power, rel=1e-10)
 
 
@@ -123,11 +148,7 @@ def test_bushings_of_a_textbook_wear_as_its_solutions_say(changes, life, tmp_pat
     Its depth goes with cos x over half of the bore: pi times the mean around it, of the same lost volume. Its numbers have
     two or three digits, and it leaves the play out, which takes 0.2 % off the sliding speed.
     """
-    file = tmp_path / "bushing.toml"
-    file.write_text(load_scene(BUSHING).with_(changes).to_toml(), encoding="utf-8")
-    code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
-    assert code == 0, output
-    found = opened.read(tmp_path / "out.nc", "wear")
+    found, _ = worn(tmp_path, load_scene(BUSHING).with_(changes))
     assert float(found.lifetime[0]) == pytest.approx(life, rel=0.005)
 
 

@@ -4,17 +4,14 @@ import cmath
 import math
 from dataclasses import replace
 
-import commands
 import numpy as np
-import opened
 import pytest
-import tomli_w
 from oracle import SliderCrank
 from refusals import refused
 from running import HUNT_CROSSLEY, run, scene_with
 from scipy.optimize import brentq
 from some_laws import row
-from test_wear import ROTOR, WEAR
+from test_wear import QUICK, ROTOR, WEAR, worn
 
 from hpcclear.base.asking import answered
 from hpcclear.dynamics import layout as at
@@ -323,30 +320,10 @@ def test_grooves_that_turn_their_own_work_aside_are_followed():
 def test_an_angular_life_of_a_turning_journal(tmp_path):
     """Its bearing is worn in one place, its journal evenly: closed forms, and the same clearance as of even wear."""
     wear = {**WEAR, "journal": {"coefficient": 5e-16}}
-    content = {
-        **ROTOR,
-        "wear": {
-            "cycles": 1e6,
-            "tolerance": 1e-3,
-            "points": 3,
-            "profile": "angular",
-            "harmonics": 2,
-        },
-    }
-    joint = {**ROTOR["mechanism"]["joints"]["main"], "wear": wear}
-    content["mechanism"] = {**ROTOR["mechanism"], "joints": {"main": joint}}
-    content["numerics"] = {
-        **ROTOR["numerics"],
-        "rtol": 1e-8,
-        "transient_revolutions": 10,
-        "averaged_revolutions": 2,
-    }
-    file = tmp_path / "rotor.toml"
-    file.write_text(tomli_w.dumps(content), encoding="utf-8")
-    code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc"), "--details"], 0)
-    assert code == 0, output
+    lives = {"cycles": 1e6, "tolerance": 1e-3, "points": 3, "profile": "angular", "harmonics": 2}
+    scene = rotor(**QUICK, **{"mechanism.joints.main.wear": wear, "wear": lives})
+    found, output = worn(tmp_path, scene, "--details")
     assert "with uniform wear" in " ".join(output.split())
-    found = opened.read(tmp_path / "out.nc", "wear")
     np.testing.assert_allclose(found.clearance, found.even_clearance, rtol=1e-5)
     assert (found.local_clearance >= found.clearance).all()
     end = found.isel(cycle=-1, joint=0, quantile=2)
