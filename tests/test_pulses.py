@@ -52,6 +52,39 @@ def gas(rows):
     return {"kind": "force", "place": "slider.pin", "direction": "180 deg", "size": rows}
 
 
+CONSTANT = {"kind": "constant-speed", "body": "crank", "speed": "3000 rpm"}
+
+
+def cylinder(begin, width):
+    """Force of a cylinder from the shaft to the piston by rows, m and N: a pulse of 20 J."""
+    rise = 0.5e-3 * width
+    rows = [[begin, 0.0], [begin + rise, 20.0 / rise], [begin + 2 * rise, 0.0]]
+    return {"kind": "cylinder", "first": "slider.pin", "second": "ground.o", "force": rows}
+
+
+def feels(rows, off, motor=None, **numerics):
+    """The work of a table over the crank angle is its virtual work."""
+    found = simulate(engine(gas(rows), motor, **numerics))
+    angle = found["crank_angle"].to_numpy()
+    turns = (motor or {}).get("turns", 1)
+    assert angle[-1] - angle[0] == pytest.approx(turns * TURN)
+    right = integral(rows, angle[0], angle[-1], turns * TURN, lever)
+    assert abs(right) > 1.0
+    assert float(found["load_work"][-1]) == pytest.approx(right, rel=off), rows[:4]
+
+
+def feels_distance(load, off, scene):
+    """The work of a cylinder is a function of the distance alone, at every instant."""
+    found = simulate(scene)
+    angle = found["crank_angle"].to_numpy()
+    place = CRANK * np.cos(angle) + np.sqrt(ROD**2 - (CRANK * np.sin(angle)) ** 2)
+    right = [straight(load["force"], place[0], one)[0] for one in place]
+    assert np.ptp(right) == pytest.approx(20.0)
+    np.testing.assert_allclose(
+        found["load_work"], right, rtol=0, atol=off * 20.0, err_msg=str(load["force"])
+    )
+
+
 def lever(angle):
     """-dx/da of the piston: work of the force over the angle."""
     rise = CRANK * np.sin(angle)
@@ -101,11 +134,7 @@ def test_work_of_a_pulse_is_its_virtual_work(kind):
         at = (5.0, 100.0, 203.0, 307.3, 61.7)[(number + KINDS.index(kind)) % 5]
         rows = pulse(kind, width, at)
         for rtol, off in ((1e-6, 1e-2), (1e-10, 1e-6)):
-            found = simulate(engine(gas(rows), rtol=rtol))
-            angle = found["crank_angle"].to_numpy()
-            right = integral(rows, angle[0], angle[-1], TURN, lever)
-            assert abs(right) > 1.0
-            assert float(found["load_work"][-1]) == pytest.approx(right, rel=off), (width, at, rtol)
+            feels(rows, off, rtol=rtol)
 
 
 def test_the_peak_of_one_degree_is_felt():
@@ -146,31 +175,12 @@ def wheel(load, interpolation="smooth", revolutions=2, motor=None):
 
 def test_prescribed_motions_feel_them_too():
     """At a constant speed nothing is integrated in steps; the work is a sum between instants."""
-    motor = {"kind": "constant-speed", "body": "crank", "speed": "3000 rpm"}
     for kind in KINDS:
         for width in (3.0, 0.3, 0.03):
-            rows = pulse(kind, width, 100.1)
-            found = simulate(engine(gas(rows), motor))
-            angle = found["crank_angle"].to_numpy()
-            right = integral(rows, angle[0], angle[-1], TURN, lever)
-            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-6), (kind, width)
-
-
-def test_prescribed_motions_feel_pulses_over_a_distance():
-    """The work of a cylinder from the shaft to the piston is a function of the distance, at every instant."""
-    motor = {"kind": "constant-speed", "body": "crank", "speed": "3000 rpm"}
+            feels(pulse(kind, width, 100.1), 1e-6, CONSTANT)
     for begin, width in ((0.13, 3.0), (0.151, 0.3), (0.1123, 0.01)):
-        rise = 0.5e-3 * width
-        rows = [[begin, 0.0], [begin + rise, 20.0 / rise], [begin + 2 * rise, 0.0]]
-        load = {"kind": "cylinder", "first": "slider.pin", "second": "ground.o", "force": rows}
-        found = simulate(engine(load, motor))
-        place = CRANK * np.cos(angle := found["crank_angle"].to_numpy())
-        place = place + np.sqrt(ROD**2 - (CRANK * np.sin(angle)) ** 2)
-        right = [straight(rows, place[0], one)[0] for one in place]
-        assert np.ptp(right) == pytest.approx(20.0)
-        np.testing.assert_allclose(
-            found["load_work"], right, rtol=0, atol=1e-5 * 20.0, err_msg=str(width)
-        )
+        load = cylinder(begin, width)
+        feels_distance(load, 1e-5, engine(load, CONSTANT))
 
 
 # ---- curves ----------------------------------------------------------------------------------------
@@ -258,13 +268,7 @@ def test_of_two_turns_a_pulse_stands_in_one():
     }  # fmt: skip
     for width in WIDTHS[2:]:
         rows = pulse("triangle", width, 5.0)
-        rows = [[0.0, 0.0], *([a + TURN, v] for a, v in rows[1:])]
-        found = simulate(engine(gas(rows), motor))
-        angle = found["crank_angle"].to_numpy()
-        assert angle[-1] - angle[0] == pytest.approx(2 * TURN)
-        right = integral(rows, angle[0], angle[-1], 2 * TURN, lever)
-        assert abs(right) > 1.0
-        assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2)
+        feels([[0.0, 0.0], *([a + TURN, v] for a, v in rows[1:])], 1e-2, motor)
 
 
 def test_a_pulse_over_another_body_s_angle():
@@ -299,20 +303,11 @@ def straight(rows, first, last):
 def test_a_pulse_over_a_distance_does_the_work_of_its_area(method):
     """A cylinder from the shaft to the piston: its work is a function of the distance alone, after every step."""
     for number, width in enumerate((10.0, 3.0, 1.0, 0.3, 0.1, 0.01)):
-        begin = (0.13, 0.151, 0.1123, 0.17, 0.12, 0.16)[number]
-        rise = 0.5e-3 * width
-        rows = [[begin, 0.0], [begin + rise, 20.0 / rise], [begin + 2 * rise, 0.0]]
-        load = {"kind": "cylinder", "first": "slider.pin", "second": "ground.o", "force": rows}
+        load = cylinder((0.13, 0.151, 0.1123, 0.17, 0.12, 0.16)[number], width)
         for rtol, off in ((1e-6, 1e-2), (1e-10, 1e-6)) if method == "auto" else ((1e-6, 1e-2),):
             scene = engine(load, rtol=rtol, method=method)
-            found = simulate(scene.with_({"output.instants_per_revolution": 0}))  # ends of steps
-            angle, work = found["crank_angle"].to_numpy(), found["load_work"].to_numpy()
-            place = CRANK * np.cos(angle) + np.sqrt(ROD**2 - (CRANK * np.sin(angle)) ** 2)
-            right = np.array([straight(rows, place[0], one)[0] for one in place])
-            assert np.ptp(right) == pytest.approx(20.0)
-            np.testing.assert_allclose(
-                work, right, rtol=0, atol=off * 20.0, err_msg=f"{width}, {rtol}"
-            )
+            ends_of_steps = scene.with_({"output.instants_per_revolution": 0})
+            feels_distance(load, off, ends_of_steps)
 
 
 def test_a_dip_over_the_speed_takes_its_time():
@@ -399,8 +394,4 @@ def test_rows_too_near_for_steps_to_end_between_them_are_refused():
 def test_other_steppers_feel_them_too(numerics):
     for kind in KINDS:
         for width in (10.0, 1.0):
-            rows = pulse(kind, width, 5.0)
-            found = simulate(engine(gas(rows), **numerics))
-            angle = found["crank_angle"].to_numpy()
-            right = integral(rows, angle[0], angle[-1], TURN, lever)
-            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2), (kind, width)
+            feels(pulse(kind, width, 5.0), 1e-2, **numerics)
