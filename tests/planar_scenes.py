@@ -16,6 +16,17 @@ def planar_scene(bodies, joints, drives, *, ground=None, loads=None, **tables) -
     return load_scene({"format_version": 2, "mechanism": mechanism, **tables})
 
 
+def without_play(linkage: Scene) -> Scene:
+    """A linkage with ideal pins in the places of those with clearance, without friction."""
+    pins = {
+        f"mechanism.joints.{one.name}": {"kind": "revolute", "journal": one.journal, "bearing": one.bearing}
+        for one in linkage.mechanism.joints if one.name in linkage.clearance_joints()
+    }  # fmt: skip
+    return linkage.with_(
+        {**pins, "effects.contact": None, "effects.friction": "none", "study": None}
+    )
+
+
 def written_out(scene: Scene) -> Scene:
     """A slider-crank with clearance in both joints by its bodies and joints."""
     bars = scene.slider_crank

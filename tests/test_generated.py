@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from dense_linkage import Dense, stiffness
+from dense_linkage import Dense, start_of, stiffness
 from doc_pages import ROOT, blocks
 from linkages import LINKAGES, constant_speed, four_bar, load
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import assemble
 
 FAST = constant_speed("motor", "crank", 200.0)
 IN_PLACE = ("slider-crank, two", "v-twin, ideal, torque", "quick-return")
@@ -145,13 +144,7 @@ def test_whole_motions_are_the_dense_model_s_and_conserve_energy(mechanism, end)
     """A four-bar from its assembly into contact, before motions of two tolerances part: to 1e-8 m, and 1e-8 of the energy."""
     lane = Lane(mechanism)
     dense = Dense(mechanism, [CONTACT] * len(mechanism.clearances), GRAVITY)
-    assembly = assemble(mechanism)
-    order = [
-        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
-        for one in assembly.loops.forest.coordinates
-    ]
-    q, v = np.zeros((2, dense.n))
-    q[order], v[order] = assembly.q, assembly.v
+    q, v = start_of(dense)
     start = coordinates(lane, dense, q, v, 0.0 * v)
     n = len(start[0])
     seen = []

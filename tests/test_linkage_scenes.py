@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_linkage import Contact, Dense, comes_as
-from planar_scenes import written_out
+from dense_linkage import Contact, Dense, comes_as, start_of
+from planar_scenes import without_play, written_out
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
@@ -26,6 +25,8 @@ LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
 ROCKER = tomllib.loads((LINKAGES / "crank_rocker.toml").read_text())
 CHI, MU, RAMP, GRAVITY = 0.4, 0.05, 0.01, 9.81
+CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
+"""Of the crank-rocker's effects."""
 
 
 def rocker(*sets):
@@ -46,19 +47,10 @@ def test_a_whole_motion_is_the_dense_model_s():
         "mechanism.joints.o2.start_eccentricity=[2e-5, 1e-5]",
         "mechanism.joints.o3.start_eccentricity=[-2e-5, 1e-5]",
     )  # fmt: skip
-    mechanism = linkage_of(scene).mechanism
-    contact = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
-    dense = Dense(mechanism, [contact] * 2, GRAVITY)
-    assembly = assemble(mechanism)
-    order = [
-        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
-        for one in assembly.loops.forest.coordinates
-    ]
-    start = np.zeros((2, dense.n))
-    start[0, order], start[1, order] = assembly.q, assembly.v
+    dense = Dense(linkage_of(scene).mechanism, [CONTACT] * 2, GRAVITY)
     response = simulate(scene)
     # contact begins in both joints before 2.5 ms; later chaos parts any two solutions
-    met = comes_as(response, dense, start, 0.0025)
+    met = comes_as(response, dense, start_of(dense), 0.0025)
     assert (response["contact_force"].to_numpy()[:met].max(axis=0) > 100.0).all()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
@@ -81,8 +73,7 @@ def test_forces_of_pins_are_the_dense_model_s():
         "mechanism.joints.way": {"kind": "slide", "point": "block.pin", "line": "ground.o"},
     })  # fmt: skip
     mechanism = linkage_of(scene).mechanism
-    contact = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
-    dense = Dense(mechanism, [contact], GRAVITY, scene.numerics.alpha, scene.numerics.beta)
+    dense = Dense(mechanism, [CONTACT], GRAVITY, scene.numerics.alpha, scene.numerics.beta)
     response = simulate(scene)
     assert int(response.status) == 0
     assert response["contact_force"].to_numpy().max() > 50.0
@@ -130,13 +121,7 @@ def test_without_play_nothing_is_integrated_and_reactions_are_the_closed_form_s(
     given = given.with_(
         {"joints.crank_rod": ideal, "joints.rod_slider": ideal, "effects": {"gravity": 9.81}}
     )
-    pins = {
-        f"mechanism.joints.{name}": {"kind": "revolute", "journal": journal, "bearing": bearing}
-        for name, journal, bearing in (
-            ("crank_rod", "crank.b", "rod.a"), ("rod_slider", "slider.pin", "rod.b")
-        )
-    }  # fmt: skip
-    planar = planar.with_({**pins, "effects": {"gravity": 9.81}})
+    planar = without_play(planar).with_({"effects": {"gravity": 9.81}})
     one, two = simulate(given), simulate(planar)
     assert two.sizes["joint"] == 0
     for name, scale in (("crank_moment", 1e-7), ("kinetic_energy", 1e-9), ("driving_work", 1e-3)):

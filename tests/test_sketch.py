@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from own_engine import engine
+from planar_scenes import planar_scene
 
 from hpcclear import simulate
 from hpcclear.base.errors import InputError
@@ -100,10 +101,8 @@ def bars(seed):
         },
         "brake": {"kind": "torque", "body": last, "torque": -3.0},
     }  # fmt: skip
-    mechanism = {"kind": "planar", "ground": {"points": ground}, "bodies": bodies, "joints": pins}
     effects = {"contact": {"law": "hunt-crossley", "damping": 0.4}, "gravity": 9.81}
-    mechanism |= {"drives": drives, "loads": loads}
-    return load_scene({"mechanism": mechanism, "effects": effects})
+    return planar_scene(bodies, pins, drives, ground=ground, loads=loads, effects=effects)
 
 
 def drawn(scene):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planar_scenes import without_play
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
@@ -51,11 +52,6 @@ def test_a_crank_turned_by_a_table_moves_as_one_of_constant_speed(formulation):
 def test_a_table_of_a_sine_is_the_harmonic_drive():
     """Without play: nothing but places, speeds, accelerations and the drive's moment."""
     mean, swing, frequency = START, 0.5, 5.0
-    pins = {
-        f"mechanism.joints.{j.name}": {"kind": "revolute", "journal": j.journal, "bearing": j.bearing}
-        for j in ROCKER.mechanism.joints
-    }  # fmt: skip
-    off = {"effects.contact": None, "effects.friction": {"law": "none"}}
     table = driven(lambda s: mean + swing * math.sin(2 * math.pi * s), seconds=1 / frequency)
     formula = {
         "kind": "harmonic",
@@ -65,7 +61,7 @@ def test_a_table_of_a_sine_is_the_harmonic_drive():
         "frequency": frequency,
     }
     harmonic = ROCKER.with_({"mechanism.drives": {"motor": formula}})
-    ours, given = (simulate(scene.with_({**pins, **off})) for scene in (table, harmonic))
+    ours, given = (simulate(without_play(scene)) for scene in (table, harmonic))
     np.testing.assert_allclose(ours["body_angle"], given["body_angle"], rtol=0, atol=1e-8)
     np.testing.assert_allclose(ours["body_spin"], given["body_spin"], rtol=0, atol=1e-5)
     largest = float(np.abs(given["crank_moment"]).max())

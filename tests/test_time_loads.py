@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planar_scenes import planar_scene
+from planar_scenes import planar_scene, without_play
 from refusals import refused
 from scipy.integrate import solve_ivp
 from test_loads import INERTIA, PIN, START, angle_of, machine
@@ -114,29 +114,12 @@ def test_a_linkage_that_ran_up_moves_as_one_at_that_speed():
         {"numerics.transient_revolutions": 0}
     )
     speed = abs(scene.mechanism.drives[0].speed)
-    drives = {
-        "motor": {
-            "kind": "run-up",
-            "body": scene.mechanism.drives[0].body,
-            "speed_by_time": [[0.0, 0.0], [0.2, speed]],
-        }
-    }
-    ideal = {
-        f"mechanism.joints.{one.name}": {"kind": "revolute", "journal": one.journal, "bearing": one.bearing}
-        for one in scene.mechanism.joints
-    }  # fmt: skip
-    off = {
-        "effects.contact": None,
-        "effects.friction": "none",
-        "study": None,
-        "numerics.rtol": 1e-10,
-    }
-    steady = simulate(scene.with_({**ideal, **off}))
-    run = simulate(
-        scene.with_(
-            {**ideal, **off, "mechanism.drives": drives, "numerics.averaged_revolutions": 4}
-        )
-    )
+    body = scene.mechanism.drives[0].body
+    motor = {"kind": "run-up", "body": body, "speed_by_time": [[0.0, 0.0], [0.2, speed]]}
+    ideal = without_play(scene).with_({"numerics.rtol": 1e-10})
+    steady = simulate(ideal)
+    run_up = {"mechanism.drives": {"motor": motor}, "numerics.averaged_revolutions": 4}
+    run = simulate(ideal.with_(run_up))
     late = run["time"].to_numpy() > 0.21
     assert late.sum() > 100
     turn = np.mod(run["crank_angle"].to_numpy()[late], TURN)

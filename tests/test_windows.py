@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linkages import constant_speed
+from planar_scenes import planar_scene
 from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.scene import Scene
 from hpcclear.scene.describing import implausible
 
 KEPT = 0.1
@@ -29,26 +29,17 @@ def windows(count, rtol, feedback):
     pins = {f"foot{k}": (f"up{k}.a", f"ground.g{k}") for k in range(count + 1)}
     pins |= {f"left{k}": (f"top{k}.a", f"up{k}.b") for k in range(count)}
     pins |= {f"right{k}": (f"top{k}.b", f"up{k + 1}.b") for k in range(count)}
+    joints = {
+        name: {"kind": "revolute", "journal": journal, "bearing": bearing}
+        for name, (journal, bearing) in pins.items()
+    }
     free = {"kind": "torque", "body": "up0", "torque": 0.0, "initial_speed": 1.0}
-    mechanism = {
-        "kind": "planar",
-        "bodies": bodies,
-        "joints": {
-            name: {"kind": "revolute", "journal": journal, "bearing": bearing}
-            for name, (journal, bearing) in pins.items()
-        },
-        "ground": {"points": {f"g{k}": [float(k), 0.0] for k in range(count + 1)}},
-        "drives": {"free": free},
-    }
-    numerics = {
-        "rtol": rtol,
-        "alpha": feedback,
-        "beta": feedback,
-        "transient_revolutions": 0,
-        "averaged_revolutions": 8,
-    }
-    content = {"format_version": 2, "mechanism": mechanism, "numerics": numerics}
-    return Scene.model_validate({**content, "effects": {"gravity": 9.81}})
+    numerics = {"rtol": rtol, "alpha": feedback, "beta": feedback}
+    return planar_scene(
+        bodies, joints, {"free": free}, ground={f"g{k}": [float(k), 0.0] for k in range(count + 1)},
+        effects={"gravity": 9.81},
+        numerics={**numerics, "transient_revolutions": 0, "averaged_revolutions": 8},
+    )  # fmt: skip
 
 
 def as_one_body(count, time):
