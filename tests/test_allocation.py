@@ -141,14 +141,8 @@ def all_kinds():
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    place = tmp_path_factory.mktemp("kinds") / "whole"
-    patch = pytest.MonkeyPatch()
-    formula.replace_dynamics(patch.setattr)
-    patch.setattr(formula, "FIELD", "peak_crank_moment")
-    run_study(all_kinds(), place, alone(), progress_style="quiet")
-    patch.undo()
-    return place
+def results(carried_out):
+    return carried_out(all_kinds(), FIELD="peak_crank_moment")
 
 
 def f_of(m2, m3, clearance, inertia):

@@ -76,13 +76,17 @@ def test_what_slides_is_drawn_by_its_place() -> None:
     assert float(np.ptp(place.to_numpy())) > 0.09
 
 
-def _other_goals() -> tuple[xr.Dataset, xr.Dataset]:
-    """The first case asks for a quantile and a formula, the second for mean and deviation."""
-    front, verified = data.front(), data.verification()
-    asked = {"first": ("95th percentile of f", "m"), "second": ("m2 + m3", "")}
+def _ask(front: xr.Dataset, asked: dict[str, tuple[str, str]]) -> None:
+    """Write goals of the first case and their units into a front."""
     for name, row in asked.items():
         for end, text in zip(("goal", "unit"), row, strict=True):
             front[f"searched_{name}_{end}"] = ("case", np.array([text, ""]))
+
+
+def _other_goals() -> tuple[xr.Dataset, xr.Dataset]:
+    """The first case asks for a quantile and a formula, the second for mean and deviation."""
+    front, verified = data.front(), data.verification()
+    _ask(front, {"first": ("95th percentile of f", "m"), "second": ("m2 + m3", "")})
     first = np.arange(2)[:, None, None] == 0
     for name, moment, value in (
         ("first", "mean", 1.5 * front["mean"]),
@@ -105,12 +109,8 @@ def _three_goals() -> tuple[xr.Dataset, xr.Dataset]:
     """The first case asks for three things, the least of the third where also the mean is least; the second for two."""
     front, verified = _other_goals()
     words = "((m2 - 0.21)/0.21)**2 + ((m3 - 0.14)/0.14)**2"
-    asked = {
-        "first": ("mean of f", "m"), "second": ("standard deviation of f", "m"), "third": (words, "")
-    }  # fmt: skip
-    for name, row in asked.items():
-        for end, text in zip(("goal", "unit"), row, strict=True):
-            front[f"searched_{name}_{end}"] = ("case", np.array([text, ""]))
+    moments = {"first": ("mean of f", "m"), "second": ("standard deviation of f", "m")}
+    _ask(front, {**moments, "third": (words, "")})
     first = np.arange(2)[:, None, None] == 0
     far = (front["m2"] / 0.21 - 1) ** 2 + (front["m3"] / 0.14 - 1) ** 2
     for name, value in zip(

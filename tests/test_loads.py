@@ -135,19 +135,22 @@ def test_a_stop_shortens_the_swing_behind_it():
     np.testing.assert_allclose(angle_of(found, "pendulum"), expected, atol=1e-8)
 
 
+def on_a_rail(load, mass, start):
+    """A block on a line, which a load moves towards a wall on that line, or away from it."""
+    bodies = {"block": {"mass": mass, "points": {"o": [0.0, 0.0]}}}
+    ground = {"points": {"o": [0.0, 0.0], "wall": [0.0, 0.2], "start": [start, 0.2]}}
+    joints = {"rail": {"kind": "slide", "point": "block.o", "line": "ground.start"}}
+    between = {"first": "block.o", "second": "ground.wall"}
+    scene = machine({"load": load | between}, bodies, joints)
+    return scene.with_({"mechanism.ground": ground})
+
+
 @pytest.mark.parametrize("acts", ["pulling", "pushing"])
 def test_a_one_sided_spring_lets_go(acts):
     """A mass on a line, thrown by a spring that only pulls (or pushes), goes on at a constant speed."""
     mass, stiffness, length, start = 0.3, 500.0, 0.1, 0.12 if acts == "pulling" else 0.08
-    bodies = {"block": {"mass": mass, "points": {"o": [0.0, 0.0]}}}
-    ground = {"points": {"o": [0.0, 0.0], "wall": [0.0, 0.2], "start": [start, 0.2]}}
-    joints = {"rail": {"kind": "slide", "point": "block.o", "line": "ground.start"}}
-    spring = {
-        "kind": "spring", "first": "block.o", "second": "ground.wall", "stiffness": stiffness,
-        "length": length, "acts": acts,
-    }  # fmt: skip
-    scene = machine({"band": spring}, bodies, joints).with_({"mechanism.ground": ground})
-    found = simulate(scene)
+    spring = {"kind": "spring", "stiffness": stiffness, "length": length, "acts": acts}
+    found = simulate(on_a_rail(spring, mass, start))
     time, w = found["time"].to_numpy(), np.sqrt(stiffness / mass)
     quarter = np.pi / (2 * w)
     swung = (start - length) * np.cos(w * time)
@@ -164,12 +167,7 @@ def test_a_one_sided_spring_lets_go(acts):
 def test_a_cylinder_pushes_by_its_stroke(force):
     """Constant: x = x0 + F t^2/(2 m); falling with the stroke: a swing about where it would be nought."""
     mass, start = 0.3, 0.1
-    bodies = {"block": {"mass": mass, "points": {"o": [0.0, 0.0]}}}
-    ground = {"points": {"o": [0.0, 0.0], "wall": [0.0, 0.2], "start": [start, 0.2]}}
-    joints = {"rail": {"kind": "slide", "point": "block.o", "line": "ground.start"}}
-    ram = {"kind": "cylinder", "first": "block.o", "second": "ground.wall", "force": force}
-    scene = machine({"ram": ram}, bodies, joints).with_({"mechanism.ground": ground})
-    found = simulate(scene)
+    found = simulate(on_a_rail({"kind": "cylinder", "force": force}, mass, start))
     time = found["time"].to_numpy()
     moved = found["body_x"].sel(body="block").to_numpy()
     if isinstance(force, list) and force[0][0] == "100 mm":

@@ -159,25 +159,15 @@ def busy(tmp_path_factory):
         yield folder
 
 
+@pytest.mark.parametrize(("kept", "said"), [(None, None), (-2000, "cut off")], ids=["whole", "cut"])
 @pytest.mark.parametrize("command", FILES, ids=lambda command: command.__name__)
-def test_what_another_run_left_is_refused_and_stays(tmp_path, command):
+def test_what_another_run_left_is_refused_and_stays(tmp_path, command, kept, said):
     place = tmp_path / "place"
     place.mkdir()
     path = planted(place / FILES[command])
-    before = path.read_bytes()
-    with pytest.raises(InputError):
-        command(place)
-    assert contents(place) == {path.name: before}
-
-
-@pytest.mark.parametrize("command", FILES, ids=lambda command: command.__name__)
-def test_a_file_that_was_cut_off_is_refused_and_stays(tmp_path, command):
-    place = tmp_path / "place"
-    place.mkdir()
-    path = planted(place / FILES[command])
-    path.write_bytes(path.read_bytes()[:-2000])
-    before = path.read_bytes()
-    with pytest.raises(InputError, match="cut off"):
+    before = path.read_bytes()[:kept]
+    path.write_bytes(before)
+    with pytest.raises(InputError, match=said):
         command(place)
     assert contents(place) == {path.name: before}
 
@@ -299,14 +289,9 @@ def test_a_stopped_run_ends_with_all_its_samples(tmp_path, kept, monkeypatch, ch
 
 
 @pytest.fixture(scope="module")
-def studied(tmp_path_factory):
+def studied(carried_out):
     """A directory with a finished study."""
-    place = tmp_path_factory.mktemp("study") / "place"
-    patch = pytest.MonkeyPatch()
-    formula.replace_dynamics(patch.setattr)
-    run(place)
-    patch.undo()
-    return place
+    return carried_out(study_scene())
 
 
 @pytest.mark.parametrize(

@@ -114,18 +114,24 @@ def test_an_edited_file_is_another_run(results, tmp_path):
         run_study(edited, results / "out", alone(), progress_style="quiet")
 
 
+SEARCH = "class Random:\n    def __init__(self, task): pass\n    def ask(self): pass\n"
+
+
 @pytest.mark.parametrize(
-    ("model", "said"),
+    ("kind", "source", "said"),
     [
-        ("class Model:\n    def fit(self, X, y): pass\n", "has no predict"),
-        ("class Model:\n    def predict(self, X): pass\n", "has no fit"),
-        ("Model = 3\n", "no class, no function and has no predict"),
-        ("class Model:\n    def __init__(self, size): pass\n", "could not be made: TypeError"),
+        ("model", "class Model:\n    def fit(self, X, y): pass\n", "has no predict"),
+        ("model", "class Model:\n    def predict(self, X): pass\n", "has no fit"),
+        ("model", "Model = 3\n", "no class, no function and has no predict"),
+        ("model", "class Model:\n    def __init__(self, size): pass\n", "not be made: TypeError"),
+        ("search", SEARCH, "no tell"),
+        ("search", "class Random:\n    pass\n", "could not be made of a task: TypeError"),
     ],
 )
-def test_no_surrogate_is_refused_before_anything_is_simulated(tmp_path, model, said):
-    scene = load_scene(written(tmp_path / "scene", model))
-    with refused("study.surrogate.model", match=said):
+def test_what_is_none_is_refused_before_anything_is_simulated(tmp_path, kind, source, said):
+    scene = load_scene(written(tmp_path / "scene", **{kind: source}))
+    entry = {"model": "study.surrogate.model", "search": "study.swarm.algorithm"}[kind]
+    with refused(entry, match=said):
         run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     assert not (tmp_path / "out").exists()
 
@@ -241,20 +247,6 @@ def task() -> SearchTask:
 def test_what_is_no_design_is_refused(asked, said):
     with refused("study.swarm.algorithm", match=said):
         asking.minimise(Fixed(asked), lambda points: points, task(), 10, "mine")
-
-
-@pytest.mark.parametrize(
-    ("search", "said"),
-    [
-        ("class Random:\n    def __init__(self, task): pass\n    def ask(self): pass\n", "no tell"),
-        ("class Random:\n    pass\n", "could not be made of a task: TypeError"),
-    ],
-)
-def test_no_search_is_refused_before_anything_is_simulated(tmp_path, search, said):
-    scene = load_scene(written(tmp_path / "scene", search=search))
-    with refused("study.swarm.algorithm", match=said):
-        run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.nightly  # algorithms of pymoo by name are in test_foreign

@@ -209,22 +209,16 @@ def sobol_g_truth() -> tuple[np.ndarray, np.ndarray]:
     return part / variance, part * rest / variance
 
 
+KNOWN = {
+    "Ishigami": (Ishigami.evaluate, TORUS, ishigami_truth),
+    "Sobol G": (lambda x: Sobol_G.evaluate(x, a=G_WEIGHTS), UNIT, sobol_g_truth),
+}
+
+
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(
-    ("function", "bounds", "truth"),
-    [
-        (Ishigami.evaluate, TORUS, ishigami_truth),
-        (lambda x: Sobol_G.evaluate(x, a=G_WEIGHTS), UNIT, sobol_g_truth),
-    ],
-    ids=["Ishigami", "Sobol G"],
-)
-def test_known_indices(
-    function: Function,
-    bounds: np.ndarray,
-    truth: Callable[[], tuple[np.ndarray, np.ndarray]],
-    seed: int,
-    shift: int,
-) -> None:
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_indices(name: str, seed: int, shift: int) -> None:
+    function, bounds, truth = KNOWN[name]
     rng = np.random.default_rng(seed + shift)
     found = sobol_indices(function, bounds, rng, 2**14)
     first, total = truth()
@@ -235,12 +229,6 @@ def test_known_indices(
 def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -> SobolIndices:
     rng = np.random.default_rng(seed)
     return sobol_indices(function, TORUS, rng, 256, **options)
-
-
-KNOWN = {
-    "Ishigami": (Ishigami.evaluate, TORUS, ishigami_truth),
-    "Sobol G": (lambda x: Sobol_G.evaluate(x, a=G_WEIGHTS), UNIT, sobol_g_truth),
-}
 
 
 @pytest.mark.parametrize("name", KNOWN)
