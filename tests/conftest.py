@@ -52,6 +52,16 @@ def carried_out(tmp_path_factory):
     return run
 
 
+@pytest.fixture(scope="module")
+def browser():
+    """A real one, for all tests of a file."""
+    from browser import Browser
+
+    made = Browser()
+    yield made
+    made.close()
+
+
 @pytest.fixture
 def place_of_all():
     """A folder that other users may enter; pytest's own are closed whenever a session of it begins."""

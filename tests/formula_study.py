@@ -50,6 +50,11 @@ def scene_of(study: str, *overrides: str) -> Scene:
     )
 
 
+def whole(*overrides: str) -> Scene:
+    """The scene of a study of two cases in all variables, with entries replaced."""
+    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), list(overrides))
+
+
 def on_ranks(scene: Scene, place: Path, *words: object, ranks: int = 2) -> Path:
     """Results of a study by so many ranks, in a place that is there."""
     (place / "scene.toml").write_text(scene.text)

@@ -23,6 +23,13 @@ from hpcclear.scene import Scene, load_scene
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 HUNT_CROSSLEY = {"law": "hunt-crossley", "damping": 0.5}
 LATCHED = {"law": "lankarani-nikravesh", "restitution": 0.9}
+RIGID = {
+    "joints.crank_rod": {"kind": "ideal"},
+    "joints.rod_slider": {"kind": "ideal"},
+    "effects.contact": None,
+    "effects.friction": {"law": "none"},
+}
+"""No joint has clearance."""
 KERNEL_ORDER = [X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import opened
 import pytest
 from margins import FALSE_RED, at_least, at_most, fewest, most
+from running import RIGID
 from scipy.stats import chi2, f
 
 from hpcclear.accuracy import averaging, integration, random_inputs, spending
@@ -261,7 +262,5 @@ def test_monte_carlo_on_the_surrogate_converges_as_theory_says(measured):
 
 
 def test_without_clearance_there_is_nothing_to_measure():
-    ideal = {key: {"kind": "ideal"} for key in ("joints.crank_rod", "joints.rod_slider")}
-    scene = PAPER.with_({**ideal, "effects.contact": None, "effects.friction": {"law": "none"}})
     with pytest.raises(InputError, match="without clearance"):
-        panels_of(scene).measured()
+        panels_of(PAPER.with_(RIGID)).measured()

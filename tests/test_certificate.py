@@ -5,7 +5,7 @@ import math
 import tomllib
 from pathlib import Path
 
-import formula
+import formula_study
 import numpy as np
 import opened
 import pytest
@@ -508,13 +508,13 @@ def test_a_linkage_is_certified(tmp_path):
 
 def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
     """On a mechanism that is a formula, which no effect changes but the clearance that it reads."""
-    formula.replace_dynamics(monkeypatch.setattr)
+    formula_study.formula.replace_dynamics(monkeypatch.setattr)
     monkeypatch.setattr(Trial, "seconds", lambda trial, variants: {"all on": [2.0, 3.0, 7.0]})
     settings = [
         "study.certificate={tolerance=0.05, samples=128}",
         'numerics.objective_joints=["crank_rod"]',
     ]
-    scene = load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), settings)
+    scene = formula_study.whole(*settings)
     told: list[str] = []
 
     def once():

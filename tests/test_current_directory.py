@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import MPIEXEC
+from commands import MPIEXEC, overrides
 from patience import crowded
 
 import hpcclear
@@ -101,10 +101,6 @@ SHORT = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
 FEW = ("study.samples=8", *SHORT)
 
 
-def settings(*entries: str) -> list[str]:
-    return [word for entry in entries for word in ("--set", entry)]
-
-
 RANKS = [str(MPIEXEC), "-n", "2"]
 COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     "show laws": ([], ["show", "laws"]),
@@ -112,22 +108,22 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     "show schema": ([], ["show", "schema"]),
     "init": ([], ["init", "made.toml"]),
     "init --import": ([], ["init", "--import", "points.csv", "imported.toml"]),
-    "check": ([], ["check", "slider_crank.toml", *settings(*SHORT)]),
-    "simulate": ([], ["simulate", "slider_crank.toml", "-o", "r.nc", *settings(*SHORT)]),
-    "sample": (RANKS, ["sample", "quickstart.toml", "-o", "s.nc", *settings(*FEW)]),
-    "sample --merge": ([], ["sample", "--merge", "quickstart.toml", "-o", "s.nc", *settings(*FEW)]),
+    "check": ([], ["check", "slider_crank.toml", *overrides(*SHORT)]),
+    "simulate": ([], ["simulate", "slider_crank.toml", "-o", "r.nc", *overrides(*SHORT)]),
+    "sample": (RANKS, ["sample", "quickstart.toml", "-o", "s.nc", *overrides(*FEW)]),
+    "sample --merge": ([], ["sample", "--merge", "quickstart.toml", "-o", "s.nc", *overrides(*FEW)]),
     "map": (
         RANKS,
-        ["map", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "m.nc", *settings(*FEW)],
+        ["map", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "m.nc", *overrides(*FEW)],
     ),
     "map --bifurcation": (
         RANKS,
-        ["map", "--bifurcation", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "b.nc", *settings(*FEW)],
+        ["map", "--bifurcation", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "b.nc", *overrides(*FEW)],
     ),
-    "wear": (RANKS, ["wear", "wear.toml", "-o", "w.nc", *settings("wear.lives=1")]),
+    "wear": (RANKS, ["wear", "wear.toml", "-o", "w.nc", *overrides("wear.lives=1")]),
     "effects": (
         RANKS,
-        ["effects", "quickstart.toml", "--tolerance", "20%", "--samples", "64", "-o", "e.nc", *settings(*FEW)],
+        ["effects", "quickstart.toml", "--tolerance", "20%", "--samples", "64", "-o", "e.nc", *overrides(*FEW)],
     ),
     "identify": (
         RANKS,
@@ -136,7 +132,7 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "run": (RANKS, ["run", "quickstart.toml", "-o", "study"]),
     "accuracy": (RANKS, ["accuracy", "slider_crank.toml", "-o", "a", "--quick"]),
-    "accuracy --plan": ([], ["accuracy", "--plan", "quickstart.toml", *settings(*FEW)]),
+    "accuracy --plan": ([], ["accuracy", "--plan", "quickstart.toml", *overrides(*FEW)]),
     "export": ([], ["export", "s.nc", "-o", "s.csv"]),
     "compare": ([], ["compare", "r.nc", "measured.csv"]),
     "plot": ([], ["plot", "r.nc", "--figure", "orbit", "-o", "o.png"]),

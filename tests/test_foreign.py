@@ -2,17 +2,16 @@
 
 import subprocess
 import sys
-import tomllib
 
 import formula
 import numpy as np
 import opened
 import pytest
+from formula_study import whole
 from refusals import refused
 from test_mopso import dtlz2
 
 from hpcclear.ranks.boundary import alone
-from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST
 from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.asking import SearchTask, SwarmSettings, minimise
@@ -102,9 +101,7 @@ def scene_of(*overrides: str):
         "study.verification.designs=2",
     )
     algorithm = ("study.sensitivity.groups=[]", "study.swarm.algorithm=pymoo:NSGA2")
-    return load_scene(
-        tomllib.loads(formula.PHYSICS + formula.STUDY), [*small, *algorithm, *overrides]
-    )
+    return whole(*small, *algorithm, *overrides)
 
 
 @pytest.fixture(autouse=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from running import HUNT_CROSSLEY, LATCHED, scene_with
+from running import HUNT_CROSSLEY, LATCHED, RIGID, scene_with
 
 from hpcclear.base.objectives import RATE
 from hpcclear.base.outcome import LEVELS, ON_REQUEST, RESPONSES, WIDEST
@@ -19,12 +19,6 @@ STUDY = {
     "variables": {"C": {"path": "joints.crank_rod.clearance", "range": [1e-4, 4e-4]}},
 }
 IDEAL = {"kind": "ideal"}
-RIGID = {
-    "joints.crank_rod": IDEAL,
-    "joints.rod_slider": IDEAL,
-    "effects.contact": None,
-    "effects.friction": {"law": "none"},
-}
 FREE = {"kind": "torque", "initial_speed": 523.6, "flywheel_inertia": 1e-2, "torque": 5.0}
 
 

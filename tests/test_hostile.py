@@ -180,18 +180,20 @@ def test_too_few_file_handles_end_in_a_message(tmp_path):
 # -- words and rank -----------------------------------------------------------------------------
 
 
+def together(first: list[object], second: list[object]) -> tuple[int, str]:
+    """Exit code and output of a job of two ranks, each with a command of its own."""
+    done = subprocess.run(
+        [MPIEXEC, "-n", "1", *first, ":", "-n", "1", *second],
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=200,
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
 def on_two_ranks(first: list[str], second: list[str], *settings: str) -> tuple[int, str]:
     """A job whose ranks get different words, the second rank an environment of its own."""
     program = [sys.executable, "-m", "hpcclear"]
     environment = [word for setting in settings for word in ("-env", *setting.split("="))]
-    done = subprocess.run(
-        [MPIEXEC, "-n", "1", *program, *first, ":", "-n", "1", *environment, *program, *second],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=200,
-    )
-    return done.returncode, done.stdout + done.stderr
+    return together([*program, *first], [*environment, *program, *second])
 
 
 @pytest.mark.mpi
@@ -221,13 +223,9 @@ def test_a_rank_that_alone_has_too_little_address_space_does_not_leave_the_other
     words = [sys.executable, "-m", "hpcclear", *sample(tmp_path / "x.nc", 40)]
     both = [words, words]
     both[alone] = ["bash", "-c", f'ulimit -v {megabytes * 1024}; exec "$@"', "bash", *words]
-    done = subprocess.run(
-        [MPIEXEC, "-n", "1", *both[0], ":", "-n", "1", *both[1]],
-        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=200,
-    )  # fmt: skip
-    assert done.returncode == 1, done
-    said = f"the limit of address space is {megabytes} MB"
-    assert (done.stdout + done.stderr).count(said) == 1, done
+    code, output = together(*both)
+    assert code == 1, output
+    assert output.count(f"the limit of address space is {megabytes} MB") == 1, output
     assert list(tmp_path.iterdir()) == []
 
 

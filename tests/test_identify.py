@@ -9,6 +9,7 @@ import opened
 import pytest
 from click.testing import CliRunner
 from doc_pages import ROOT
+from test_compare import table
 
 import hpcclear
 from hpcclear.base.errors import InputError
@@ -44,13 +45,6 @@ def scene():
 
 
 # -- signals ----------------------------------------------------------------------------------------
-
-
-def table(path: Path, columns: dict[str, np.ndarray]) -> Path:
-    rows = zip(*columns.values(), strict=True)
-    text = "\n".join(",".join(f"{value:.12g}" for value in row) for row in rows)
-    path.write_text(f"{','.join(columns)}\n{text}\n")
-    return path
 
 
 def wave(turns: np.ndarray) -> np.ndarray:
@@ -468,8 +462,8 @@ def identified(measured, tmp_path_factory):
     words = ["identify", str(SCENE), "--unknown", UNKNOWN, "-o", str(place), "--members", "32"]
     words += [word for change in SHORT for word in ("--set", change)]
     words += ["--advise", "--limit", "100um", "--progress", "quiet"]
-    for table, date in zip(measured, ("2026-01-01", "2026-03-01"), strict=True):
-        words += ["--signal", str(table), "--date", date]
+    for signal, date in zip(measured, ("2026-01-01", "2026-03-01"), strict=True):
+        words += ["--signal", str(signal), "--date", date]
     real, simulated = single.simulate_together, []
 
     def breaking(scenes, copies):

@@ -5,7 +5,6 @@ import json
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner
+from formula_study import whole as study_scene
 from patience import crowded
 from streaming_run import make_made_up
 
@@ -47,10 +47,6 @@ SAMPLES = 5000  # two blocks
 def _dynamics(monkeypatch):
     formula.replace_dynamics(monkeypatch.setattr)
     monkeypatch.setattr("hpcclear.ensemble.statistics.make_evaluator", make_made_up)
-
-
-def study_scene(*overrides: str) -> Scene:
-    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), overrides)
 
 
 def random_scene(*overrides: str) -> Scene:

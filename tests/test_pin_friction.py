@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import refused
+from running import RIGID
 from scipy.integrate import solve_ivp
 from test_loads import INERTIA, PIN, START, STIFFNESS, angle_of, machine
 
@@ -99,9 +100,8 @@ def test_a_pendulum_decays_as_its_implicit_reaction_has_it():
 @pytest.fixture(scope="module")
 def held():
     """A slider-crank without clearance at a constant speed."""
-    ideal = {f"joints.{name}": {"kind": "ideal"} for name in ("crank_rod", "rod_slider")}
-    changes = {"effects.contact": None, "effects.friction": "none", "effects.gravity": GRAVITY}
-    return load_scene(SLIDER_CRANK).with_({**ideal, **changes, "numerics.averaged_revolutions": 1})
+    changes = {**RIGID, "effects.gravity": GRAVITY, "numerics.averaged_revolutions": 1}
+    return load_scene(SLIDER_CRANK).with_(changes)
 
 
 def test_friction_of_all_pins_is_felt_by_the_drive(held):

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -196,15 +195,6 @@ def test_the_crank_is_found_from_the_motion() -> None:
 # In a real browser
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    made = Browser()
-    try:
-        yield made
-    finally:
-        made.close()
-
-
 def _panel(browser: Browser) -> str:
     return str(browser.run("return document.getElementById('front-panel').innerText;"))
 
@@ -257,22 +247,12 @@ def test_both_schemes_are_followed(browser: Browser, page: Path, scheme: str, da
 
 @pytest.mark.full
 def test_a_warning_leads_to_its_place_by_keyboard(browser: Browser, page: Path) -> None:
-    """The links of what to trust, and every fold, are reached by Tab; a link opens the fold that it leads to."""
+    """The links of what to trust are reached by Tab, and open the fold that they lead to; `test_screens` reaches all else."""
     browser.open(page, 1280)
     browser.press("Tab", "Tab", "Tab")
     assert browser.run("return document.activeElement.closest('.trust') !== null;")
     browser.press("Enter")
     browser.wait("document.querySelector(location.hash).open")
-    reached = set()
-    for _ in range(60):
-        browser.press("Tab")
-        reached.add(
-            browser.run(
-                "return (document.activeElement.closest('.folds > details') || {}).id || '';"
-            )
-        )
-    folds = browser.run("return [...document.querySelectorAll('.folds > details')].map(e => e.id);")
-    assert set(folds) <= reached
 
 
 @pytest.mark.full

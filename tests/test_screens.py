@@ -1,7 +1,6 @@
 """Pages of every kind of result in a browser: first screen, accessibility by axe-core (WCAG A and AA), nothing sideways."""
 
 import re
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -93,13 +92,6 @@ def pages(tmp_path_factory: pytest.TempPathFactory, carried_out: Any) -> dict[st
         code, printed = commands.warm_command(*words, "-o", places[kind] / f"{kind}.nc")
         assert code == 0, printed
     return {kind: write_report(place) for kind, place in places.items()}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    made = Browser()
-    yield made
-    made.close()
 
 
 def test_the_headline_of_lives_names_their_limit(pages: dict[str, Path]) -> None:

@@ -1,13 +1,13 @@
 """The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
 
 import re
-import tomllib
 from collections import Counter
 
 import numpy as np
 import opened
 import pytest
 from formula_study import contents, formula, on_ranks
+from formula_study import whole as scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
@@ -20,7 +20,6 @@ from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
 from hpcclear.report.merit import recommended
 from hpcclear.results.names import KINDS, designs_in
-from hpcclear.scene import load_scene
 from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import chaos, extent, responses, run_study
 from hpcclear.study.paper import claims
@@ -31,10 +30,6 @@ from hpcclear.study.stages import files_of
 
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
-
-
-def scene_of(*overrides: str):
-    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), overrides)
 
 
 @pytest.fixture(autouse=True)

@@ -1,6 +1,5 @@
 """Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
 
-import tomllib
 from pathlib import Path
 
 import formula
@@ -8,6 +7,7 @@ import numpy as np
 import opened
 import pytest
 import xarray as xr
+from formula_study import whole
 from refusals import refused
 
 from hpcclear.base.verdict import Verdict
@@ -16,7 +16,7 @@ from hpcclear.report.constraints import worded
 from hpcclear.report.html import designs, picture
 from hpcclear.report.html.content import read
 from hpcclear.results.content import Results, each
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import run_study
 
@@ -57,7 +57,7 @@ STUDY = (
 
 
 def scene_of(*overrides: str) -> Scene:
-    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), [*STUDY, *overrides])
+    return whole(*STUDY, *overrides)
 
 
 @pytest.fixture(autouse=True)
