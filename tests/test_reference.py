@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import integrate
+from running import HUNT_CROSSLEY, LATCHED, integrate
 
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
@@ -19,8 +19,6 @@ from hpcclear.scene.points import Points
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 CLEARANCES = ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
-HUNT_CROSSLEY = {"law": "hunt-crossley", "damping": 0.5}
-LATCHED = {"law": "lankarani-nikravesh", "restitution": 0.9}
 
 # Two independent prototypes and Exudyn: law, clearance m, revolutions, slider m and m/s at their end, objective m of
 # the last one.

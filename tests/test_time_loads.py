@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from planar_scenes import planar_scene, without_play
+from planar_scenes import without_play
 from refusals import refused
 from scipy.integrate import solve_ivp
-from test_loads import INERTIA, PIN, START, angle_of, machine
+from test_linkage_scenes import rocker
+from test_loads import INERTIA, START, angle_of, machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.dynamics.evaluation import evaluator_of
@@ -186,39 +187,24 @@ def test_a_motion_by_the_time_has_no_steady_mean():
 
 
 def mirrored(side):
-    """A four-bar with clearance that a table turns, counter-clockwise (side 1) or, all of it mirrored, clockwise (-1)."""
+    """A crank-rocker with clearance that a table turns, counter-clockwise (side 1) or, all of it mirrored, clockwise (-1)."""
     times = np.linspace(0.0, 0.1, 41)
     angle = 0.4 + TURN * times / 0.1 + 0.2 * np.sin(TURN * times / 0.1)
     brake = [[a * side, t * side] for a, t in ((1.0, -0.5), (2.5, 0.3), (4.0, -0.1))]
-    bodies = {
-        "crank": {"length": 0.04, "mass": 0.2, "inertia": 3e-5, "start_angle": 0.4 * side},
-        "coupler": {"length": 0.12, "mass": 0.3, "inertia": 4e-4, "start_angle": 0.5 * side},
-        "rocker": {"length": 0.08, "mass": 0.25, "inertia": 2e-4, "start_angle": 1.6 * side},
-    }
-    joints = {
-        "o1": {**PIN, "journal": "crank.a"},
-        "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
-        "o3": {
-            "kind": "clearance", "journal": "coupler.b", "bearing": "rocker.b", "clearance": 2e-4,
-            "bearing_radius": 0.01, "materials": {part: {"youngs_modulus": "2 GPa", "poisson_ratio": 0.4}
-                                                  for part in ("bearing", "journal")},
-        },
-        "o4": {"kind": "revolute", "journal": "rocker.a", "bearing": "ground.p"},
-    }  # fmt: skip
-    drive = {
-        "kind": "table",
-        "body": "crank",
-        "angle": [[t, a * side] for t, a in zip(times, angle, strict=True)],
-    }
-    loads = {"brake": {"kind": "torque", "body": "rocker", "torque": sorted(brake)}}
-    return planar_scene(
-        bodies, joints, {"cam": drive}, loads=loads, ground={"o": [0.0, 0.0], "p": [0.13, 0.01 * side]},
-        effects={
-            "gravity": 0.0, "contact": {"law": "hunt-crossley", "damping": 0.4},
-            "friction": {"law": "coulomb", "coefficient": 0.1, "ramp_speed": 0.05},
-        },
-        numerics={"rtol": 1e-9, "transient_revolutions": 0, "averaged_revolutions": 1},
-    )  # fmt: skip
+    rows = [[t, a * side] for t, a in zip(times, angle, strict=True)]
+    starts = {"crank": 0.4, "coupler": 0.5, "rocker": 1.6}
+    soft = {"youngs_modulus": "2 GPa", "poisson_ratio": 0.4}
+    return rocker().with_({
+        **{f"mechanism.bodies.{name}.start_angle": start * side for name, start in starts.items()},
+        "mechanism.ground.points.p": [0.13, 0.01 * side],
+        "mechanism.joints.o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "mechanism.joints.o3.materials": {"bearing": soft, "journal": soft},
+        "mechanism.drives": {"cam": {"kind": "table", "body": "crank", "angle": rows}},
+        "mechanism.loads": {"brake": {"kind": "torque", "body": "rocker", "torque": sorted(brake)}},
+        "effects.gravity": 0.0,
+        "effects.friction": {"law": "coulomb", "coefficient": 0.1, "ramp_speed": 0.05},
+        "numerics.rtol": 1e-9,
+    })  # fmt: skip
 
 
 def test_a_clockwise_table_drive_is_the_mirror_image():
