@@ -6,8 +6,7 @@ from collections import Counter
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks
-from formula_study import whole as scene_of
+from formula_study import contents, formula, on_ranks, whole as scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
