@@ -14,7 +14,7 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import scatter
 from hpcclear.report.answer import answer
-from hpcclear.report.constraints import worded
+from hpcclear.report.constraints import constraints_of
 from hpcclear.report.html.content import Content
 from hpcclear.report.screens import screen_of
 from hpcclear.results.content import Results
@@ -180,7 +180,7 @@ def test_the_cheapest_design_is_that_of_enumeration(results):
     best = found.sel(design="a alpha")
     assert float(best["first_true"]) == least
     assert best["constraint_verdict"].to_numpy().tolist() == [Verdict.HOLDS] * 2
-    words = "; ".join(worded(Results.of(best)))
+    words = "; ".join(map(str, constraints_of(Results.of(best))))
     assert "mean of peak torque of the drive on the crank" in words
     assert "at most 600 µN m" in words
     assert str(best["second_goal"].item()) == "99.9th percentile of f"

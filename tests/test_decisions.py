@@ -210,7 +210,8 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
     unseen = done["constraint_true"].to_numpy() == 0.0
     assert (done["constraint_upper"].to_numpy()[unseen] > 0.0).all()
     for verdict, one in zip(verdicts, each(Results.of(done), "design"), strict=True):
-        assert f": {constraints.WORDS[verdict]}" in "; ".join(constraints.worded(one))
+        words = "; ".join(map(str, constraints.constraints_of(one)))
+        assert f": {constraints.WORDS[verdict]}" in words
     best = done.sel(design="light alpha")
     assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert int(best["rare_samples"]) > int(best["samples"])  # the rare failure needs more

@@ -12,7 +12,7 @@ from refusals import refused
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.constraints import worded
+from hpcclear.report.constraints import constraints_of
 from hpcclear.report.html import designs, picture
 from hpcclear.report.html.content import read
 from hpcclear.results.content import Results, each
@@ -158,7 +158,7 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     assert {f"five {end}" for end in (*ENDS, "delta", "epsilon")} <= set(names)
     assert "plain gamma" not in found["design"].to_numpy()
     for one, mass in zip(each(Results.of(five), "design"), five["m2"].to_numpy(), strict=True):
-        assert [*worded(one)] == [
+        assert [*map(str, constraints_of(one))] == [
             f"m2 = {mass:.4g}, at most 0.3: {'satisfied' if mass <= 0.3 else 'violated'}"
         ]
     broken = five["constraint_verdict"].to_numpy()[:, 0] == Verdict.FAILS

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from hpcclear.report import alike
-from hpcclear.report.constraints import constraints_of, worded
+from hpcclear.report.constraints import constraints_of
 from hpcclear.report.merit import best_of, judged, merit, ours_of
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
@@ -46,7 +46,7 @@ def _head(of: Recommended) -> Iterator[Line]:
     name = text_in(best, "design")
     text = f"{name}: {merit(best)} of {count} simulated designs, case {case}"
     yield Line("criterion", text)
-    yield from (Line("constraint", text) for text in worded(best))
+    yield from (Line("constraint", str(one)) for one in constraints_of(best))
     if near := alike.flat(ours, best, judged(ours)):
         yield Line("near", near)
 

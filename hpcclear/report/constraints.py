@@ -1,6 +1,5 @@
 """Verdicts on the constraints of designs, in words; programs go by the numbers and codes of the file."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -44,11 +43,11 @@ class JudgedConstraint(NamedTuple):
         return f"at most {quantity(self.most, self.unit)}: {WORDS[self.verdict]}"
 
     def __str__(self) -> str:
+        """As "probability of f above 3 N = 0.01 (95 % CI 0.009 to 0.011), at most 0.05: satisfied"."""
         shown, ends = stated(self.true, self.lower, self.upper, self.unit)
         within = f" (95 % CI {ends})" if self.lower < self.upper else ""
-        return f"{self.goal} = {shown}{within}, {self.bounded}" + (
-            f" ({self.deciding})" if self.deciding else ""
-        )
+        more = f" ({self.deciding})" if self.deciding else ""
+        return f"{self.goal} = {shown}{within}, {self.bounded}{more}"
 
 
 def constraints_of(one: Results) -> list[JudgedConstraint]:
@@ -68,8 +67,3 @@ def verdict_of(one: Results) -> Verdict | None:
     codes = one["constraint_verdict"].values if "constraint_verdict" in one else np.array([])
     found = codes[codes != ABSENT].tolist()
     return together(found) if found else None
-
-
-def worded(one: Results) -> Iterator[str]:
-    """Yield constraints of a design: "probability of f above 3 N = 0.01 (95 % CI 0.009 to 0.011), at most 0.05: satisfied"."""
-    return map(str, constraints_of(one))

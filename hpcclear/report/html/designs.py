@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike
-from hpcclear.report.constraints import worded
+from hpcclear.report.constraints import constraints_of
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, number
@@ -141,7 +141,7 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
         value = labels.quantity(float(one[f"{name}_true"]), text_in(one, f"{name}_unit"))
         words = text_in(one, f"{name}_goal")
         cells.append(f"{words}: {value}" if words else "")
-    return [*cells, "; ".join(worded(one)) or "none"]
+    return [*cells, "; ".join(map(str, constraints_of(one))) or "none"]
 
 
 def _cell(own: Variable, one: Results, scale: labels.Scale) -> str:
