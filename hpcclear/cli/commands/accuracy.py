@@ -50,7 +50,7 @@ def run(
     if plan:
         _plan(written, error, workers)
     elif output is None:
-        raise click.UsageError("Missing option '-o' / '--output'.", click.get_current_context())
+        raise click.UsageError("Missing option '-o' / '--output'.")
     else:
         _measure(written, output, quick, fresh, time_limit)
 

@@ -59,11 +59,10 @@ def run(
     cli.check_mode("--jobs", jobs, ("four_stroke", "compressor"))
     cli.check_mode("--compressor", compressor, ("four_stroke",))
     if imports and not source:
-        raise click.UsageError("Missing argument 'SOURCE'.", click.get_current_context())
+        raise click.UsageError("Missing argument 'SOURCE'.")
     if len(source) > imports:
         extra = " ".join(map(str, source[imports:]))
-        words = f"Got unexpected extra argument ({extra})"
-        raise click.UsageError(words, click.get_current_context())
+        raise click.UsageError(f"Got unexpected extra argument ({extra})")
     cli.check_free(file)
     if imports:
         _import(source[0], file, unit, sketch)
