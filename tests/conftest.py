@@ -63,6 +63,12 @@ def browser():
 
 
 @pytest.fixture
+def details(monkeypatch):
+    """What commands print of results is all of them, as with ``--details``."""
+    monkeypatch.setattr("hpcclear.cli.printing.detailed", lambda: True)
+
+
+@pytest.fixture
 def place_of_all():
     """A folder that other users may enter; pytest's own are closed whenever a session of it begins."""
     here = Path(__file__).resolve()

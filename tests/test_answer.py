@@ -207,7 +207,9 @@ SHORT |= {("one joint", "slider-acceleration-deviation"), ("damped", "mean-conta
     ],
 )
 @pytest.mark.shortened(1)
-def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, scene, objective):
+def test_a_study_of_ones_own_tells_its_own_story(
+    tmp_path, monkeypatch, capsys, details, scene, objective
+):
     """No word of the paper's in page and terminal; f by its own name, variables by theirs."""
     formula.replace_dynamics(monkeypatch.setattr)
     monkeypatch.setattr(formula, "FIELD", objective.replace("-", "_"))
@@ -217,7 +219,7 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
     place = tmp_path / "out"
     own = engine(*SCENES[scene], f"study.objective={objective}", "study.sensitivity.levels=2")
     run_study(own, place, alone(), progress_style="quiet")
-    describe(read(place), place / "verification.nc", details=True)
+    describe(read(place), place / "verification.nc")
     printed = capsys.readouterr().out
     assert {path.name for path in place.glob("*.nc")} >= {"front.nc", "verification.nc"}
     shutil.rmtree(place / "responses")  # those of the formula lack what figures draw

@@ -55,9 +55,9 @@ def test_means_are_over_time_whatever_the_instants():
             assert one.contact == pytest.approx(0.3, abs=4 / 360)
 
 
-def test_a_failed_simulation_has_no_loads(tmp_path, capsys):
+def test_a_failed_simulation_has_no_loads(tmp_path, capsys, details):
     made = response(status=np.int8(Status.STEP_CAP))
-    describe_response(made, tmp_path / "a.nc", details=True)
+    describe_response(made, tmp_path / "a.nc")
     shown = capsys.readouterr().out
     assert "peak force" not in shown
 
@@ -82,7 +82,9 @@ def test_no_share_is_rounded_to_all_or_nothing(contact):
     assert (re.fullmatch(r"(0|100) %", shown) is not None) == (contact in (0.0, 1.0))
 
 
-def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(tmp_path, capsys):
+def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(
+    tmp_path, capsys, details
+):
     made = response()
     angle, force = made["crank_angle"].to_numpy().copy(), 0.39
     made["driving_work"][:] = force * angle
@@ -97,7 +99,7 @@ def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(tmp_pa
     assert bearings.torque(made).mean == pytest.approx(force)
     made["crank_angle"][:] = np.sin(angle)  # it swings
     assert np.isnan(bearings.torque(made).mean)
-    describe_response(made, tmp_path / "a.nc", details=True)
+    describe_response(made, tmp_path / "a.nc")
     assert "largest 814 N m, mean" not in capsys.readouterr().out
 
 

@@ -148,9 +148,9 @@ def test_a_response_holds_the_load_that_was_applied(more):
     assert np.allclose(found.crank_speed, 100 * np.pi)
 
 
-def test_a_peak_between_the_instants_of_the_series_has_its_angle(tmp_path, capsys):
+def test_a_peak_between_the_instants_of_the_series_has_its_angle(tmp_path, capsys, details):
     response = hpcclear.simulate(engine("output.instants_per_revolution=12", study=False))
-    describe_response(response, tmp_path / "response.nc", details=True)
+    describe_response(response, tmp_path / "response.nc")
     told = " ".join(capsys.readouterr().out.split())
     with labels.in_units_of(response.attrs["scene"]):
         for peak, angle in zip(response.peak_contact_force, response.peak_angle, strict=True):

@@ -77,7 +77,7 @@ def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
 # -- one response --------------------------------------------------------------------------------------
 
 
-def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
+def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys, details):
     """The start transient is twice as hard; the peak is of the last two of four revolutions."""
     response = data.response()
     turn = response["crank_angle"].to_numpy() / (2.0 * np.pi)
@@ -85,7 +85,7 @@ def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
     response["contact_force"][:] = force[:, None]
     response["peak_contact_force"][:] = 1500.0
     response.attrs["transient_turns"] = 2
-    describe_response(response, tmp_path / "a.nc", details=True)
+    describe_response(response, tmp_path / "a.nc")
     shown = " ".join(capsys.readouterr().out.split())
     assert "Peak force 1.5 kN" in shown
     assert "2 kN" not in shown

@@ -163,7 +163,7 @@ def test_a_regular_response_is_printed_without_a_warning(tmp_path: Path):
     assert "sensitive" not in done.stdout
 
 
-def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Path, capsys):
+def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Path, capsys, details):
     from hpcclear.cli.printing import describe_run
 
     for error, words in ((None, "not checked"), (0.3, "median")):
@@ -176,7 +176,7 @@ def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Pat
         )
         same = found.content["objective_uncertainty"].to_numpy()
         np.testing.assert_array_equal(same, found.content.get("objective_limit", np.nan * same))
-        describe_run(found, "samples", details=True)
+        describe_run(found, "samples")
         line = next(x for x in capsys.readouterr().out.splitlines() if "half-width of f" in x)
         assert words in line
 

@@ -220,13 +220,13 @@ def test_f_is_the_root_sum_of_squares_of_as_many_joints_as_there_are(gaps):
     assert objective(np.array([gaps, gaps])) == pytest.approx([float(np.linalg.norm(gaps))] * 2)
 
 
-def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
+def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys, details):
     settings = [ONE_JOINT, "numerics.target_error=0.5", "numerics.target_revolutions=100"]
     scene = load_scene(FILE.parent / "linkages" / "crank_rocker.toml", settings)
     found = simulate(scene)
     assert found["mean_gap"].shape == (1,)
     assert float(found["objective"]) == float(found["mean_gap"][0]) > 0.0
-    describe_response(found, tmp_path / "a.nc", details=True)
+    describe_response(found, tmp_path / "a.nc")
     steady = re.search(r"\nf +([0-9.]+)", capsys.readouterr().out)
     assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
 

@@ -33,16 +33,12 @@ LINES = 24
 _COLOURS = {Level.RED: "bold red", Level.AMBER: "yellow", Level.GREEN: "green"}
 
 
-def describe(
-    content: Content, *written: Path, asked: Sequence[Line] = (), details: bool | None = None
-) -> None:
-    """Print the first screen of results, then the files that were written.
+def describe(content: Content, *written: Path, asked: Sequence[Line] = ()) -> None:
+    """Print the first screen of results, with ``--details`` all sections of the page, then the files that were written.
 
-    `asked`: further lines that were requested. `details`: whether all sections of the page follow; by default as the option
-    ``--details`` says.
+    `asked`: further lines that were requested.
     """
-    out = console()
-    details = detailed() if details is None else details
+    out, details = console(), detailed()
     files = [f"written  {path}" for path in written if path.exists()]
     more = [line for one in asked for line in _labelled(one.label, one.text)]
     with in_units_of(content.attribute("scene")):
@@ -69,19 +65,17 @@ def _print_sections(out: Console, content: Content) -> None:
         out.print(text)
 
 
-def describe_run(
-    found: "Finished", kind: str, asked: Sequence[Line] = (), details: bool | None = None
-) -> None:
-    """Print what a run on all ranks found, of this kind; further arguments as for `describe`."""
+def describe_run(found: "Finished", kind: str, asked: Sequence[Line] = ()) -> None:
+    """Print what a run on all ranks found, of this kind; `asked` as for `describe`."""
     own = {kind: found.content}
     with contextlib.suppress(InputError):  # it may be written over by another command
         own["timing"] = dataset.read(found.timing, "timing")
-    describe(Content(found.output.parent, own), found.output, asked=asked, details=details)
+    describe(Content(found.output.parent, own), found.output, asked=asked)
 
 
-def describe_response(response: Results, output: Path, details: bool | None = None) -> None:
+def describe_response(response: Results, output: Path) -> None:
     """Print one response (kind ``response``) and its file."""
-    describe(Content(output.parent, {}, {"response": response}), output, details=details)
+    describe(Content(output.parent, {}, {"response": response}), output)
 
 
 def fitted(first: Screen, most: int) -> list[Text]:
@@ -137,12 +131,9 @@ def _wrapped(text: str, margin: int = 0) -> list[str]:
 def _columns(rows: Sequence[Sequence[str]]) -> Iterator[Text]:
     """Rows in columns that fit the terminal; labels that are too long are cut, and lines that still are too long are folded."""
     filled = [[fitting(cell) for cell in row] for row in rows]
-    count = max(map(len, filled), default=0)
-    filled = [[*row, *[""] * (count - len(row))] for row in filled]
-    widths = [max(len(row[k]) for row in filled) for k in range(count)]
-    if filled:
-        rest = sum(widths[1:]) + 2 * sum(width > 0 for width in widths[1:])
-        widths[0] = min(widths[0], max(WIDTH - rest, 24))
+    widths = [max(map(len, column)) for column in zip(*filled, strict=True)]
+    rest = sum(widths[1:]) + 2 * sum(width > 0 for width in widths[1:])
+    widths[0] = min(widths[0], max(WIDTH - rest, 24))
     for row in filled:
         row[0] = textwrap.shorten(row[0], widths[0], placeholder="..")
         line = "  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True) if w)
