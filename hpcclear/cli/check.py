@@ -127,10 +127,9 @@ def _tables(scene: Scene) -> list[tuple[str, str]]:
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
     """How a linkage was put together, a row a body; refuses one that does not close."""
-    from hpcclear.dynamics.planar.problem import linkage_of, put_together
+    from hpcclear.dynamics.planar.problem import put_together
     from hpcclear.dynamics.planar.tables import mechanism_of
 
-    linkage_of(scene)
     lines = put_together(mechanism_of(scene.linkage)).report()
     return [(f"start of {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
