@@ -42,11 +42,8 @@ def table(title: str, rows: Iterable[Sequence[str]], header: Sequence[str] = ())
         title=title or None, title_justify="left", box=box.SIMPLE_HEAD, show_header=bool(header), pad_edge=False
     )  # fmt: skip
     cells: Sequence[Sequence[str]] = [header or ("", ""), *rows]
-    ways = (
-        [(one, tie) for tie in ("_±_", " ± ") for one in (cells, [*zip(*cells, strict=True)])]
-        if header
-        else []
-    )
+    ties = ("_±_", " ± ") if header else ()
+    ways = [(one, tie) for tie in ties for one in (cells, [*zip(*cells, strict=True)])]
     fitting = ((one, widths) for one, tie in ways if (widths := _widths(one, tie)))
     cells, widths = next(fitting, (cells, None))
     for k, head in enumerate(cells[0]):
