@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from hpcclear.report.html.content import Content
 
-    Drawings = Mapping[str, Callable[[], Figure]]
-
 One = TypeVar("One")
 KINDS = ("png", "svg", "pdf")
 
@@ -126,7 +124,7 @@ def _label(text: str) -> tuple[str, str]:
     return name.strip(), words.strip()
 
 
-def _drawn(figures: "Drawings", chosen: bool) -> "dict[str, Figure]":
+def _drawn(figures: "Mapping[str, Callable[[], Figure]]", chosen: bool) -> "dict[str, Figure]":
     """The figures; of all that there may be, those that need more are named."""
     drawn = {}
     for name, draw in figures.items():
