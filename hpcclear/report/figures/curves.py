@@ -112,17 +112,16 @@ def _curve(axes: "style.Axes", curve: Tabulated) -> None:
     places, values = np.array(curve.rows).T
     shown = labels.scale(curve.unit, values)
     by = _BY.get(curve.over, _TURNING) if curve.over != "distance" else labels.scale("m", places)
-    factor = by.factor
     if curve.turns:
         places = np.mod(places, 2.0 * np.pi * curve.turns)
         axes.set_xlim(0.0, 360.0 * curve.turns)
         axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
     else:
-        axes.set_xlim(factor * places[0], factor * places[-1])
+        axes.set_xlim(*by(places[[0, -1]]))
     x, y = (places, values) if curve.acting is None else _drawn(curve.acting)
-    axes.plot(factor * x, shown(y), lw=0.9, color=style.colour("green"))
+    axes.plot(by(x), shown(y), lw=0.9, color=style.colour("green"))
     if len(curve.rows) <= _FEW:
-        axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.colour("green"))
+        axes.plot(by(places), shown(values), ".", ms=3.0, color=style.colour("green"))
     axes.set_xlabel(by.label(curve.over), labelpad=1.0)
     axes.set_title(labels.literal(shown.label(labels.entry(curve.key))), pad=2.0)
 
