@@ -102,10 +102,13 @@ def read(*places: str | Path) -> Content:
     return Content(place, files, responses, tuple(troubles), whole, samples, float(dated))
 
 
+_loaded = lru_cache(maxsize=4)(scene_of_text)
+
+
 def scene_in(text: str) -> Scene | None:
     """Return the scene of a file; None without it, or of another version."""
     try:
-        return _scene(text)
+        return _loaded(text, "scene")
     except InputError:
         return None
 
@@ -113,8 +116,3 @@ def scene_in(text: str) -> Scene | None:
 def scene_of(content: Results) -> Scene | None:
     """Return the scene that results were made of; None where that is not known."""
     return scene_in(str(content.attrs.get("scene", "")))
-
-
-@lru_cache(maxsize=4)
-def _scene(text: str) -> Scene:
-    return scene_of_text(text, "scene")
