@@ -39,7 +39,7 @@ def claims(found: Results) -> list[object]:
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
     badges = [_BADGES[Verdict(verdict)] for verdict in verdicts]
     texts = [f"{int(one['claim'])}. {text_in(one, 'text')}" for one in each(found, "claim")]
-    rows = [[text, badge] for text, badge in zip(texts, badges, strict=True)]
+    rows = zip(texts, badges, strict=True)
     title = "Claims of the paper; claims.nc has the numbers that decide"
     return [held, PageTable(["claim", "verdict"], rows, title)]
 
