@@ -129,8 +129,7 @@ def _lower_edges(variable: Variable, content: Results, rows: tuple[str, ...]) ->
     """A variable; edges between bins as the lower edge of each bin, -inf of the first."""
     if "edge" in variable.dims and rows == ("bin",):
         edges = variable.dims.index("edge")
-        before = [(1 if k == edges else 0, 0) for k in range(len(variable.dims))]
-        whole = np.pad(variable.values, before, constant_values=-np.inf)
+        whole = np.insert(variable.values, 0, -np.inf, axis=edges)
         if whole.shape[edges] == content.sizes["bin"]:
             dims = tuple("bin" if dim == "edge" else dim for dim in variable.dims)
             variable = Variable(dims, whole, variable.attrs, variable.name)
