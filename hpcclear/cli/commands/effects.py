@@ -1,5 +1,6 @@
 """`effects`: which effects of a scene can be neglected."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -66,10 +67,8 @@ def tolerance_of(words: str) -> float:
     """A relative change: 0.01, or 1%. Raises InputError if it is no number."""
     from hpcclear.base.units import UnitError, to_si  # not for the list of commands
 
-    try:
+    with suppress(ValueError):
         return float(words)
-    except ValueError:
-        pass
     try:
         return to_si(words, "")
     except UnitError as error:
