@@ -38,7 +38,7 @@ def run(
 
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
-    from hpcclear.cli.tables import console, table as tabled
+    from hpcclear.cli.tables import console, table
     from hpcclear.report import export as writing
     from hpcclear.report.spread import rows_of, side_by_side
 
@@ -46,17 +46,17 @@ def run(
     if statistics:
         samples = writing.read_samples(files)
         lines = side_by_side(samples, beyond)
-        table = writing.statistics(samples, cli.place_of(output), lines, units)
-        console().print(tabled("", rows_of(lines), ["statistic", *samples]))
+        made = writing.statistics(samples, cli.place_of(output), lines, units)
+        console().print(table("", rows_of(lines), ["statistic", *samples]))
     else:
         if len(files) > 1 or beyond:
             reason = "a table holds one result"
             remedy = "Add --statistics, or export each by itself"
             raise InputError("export", f"{len(files)} files", reason, remedy)
-        table = writing.export(files[0], cli.place_of(output), units)
-        if left := list(table.attrs["left_out"]):
+        made = writing.export(files[0], cli.place_of(output), units)
+        if left := list(made.attrs["left_out"]):
             more = f" and {len(left) - 3} more" if len(left) > 3 else ""
             named = f"{', '.join(left[:3])}{more}"
             cli.say(f"Note: left out, with too many columns for a table: {named} (in {files[0]})")
-    rows, columns = counted(len(table), "row"), counted(len(table.columns), "column")
+    rows, columns = counted(len(made), "row"), counted(len(made.columns), "column")
     cli.show(f"written  {output}: {rows}, {columns}")
