@@ -118,13 +118,11 @@ def clearances(response: Results) -> Array:
 
 def reaches(response: Results) -> Array:
     """Eccentricity |e| at which each joint touches, m, shape (joints,): |e| less penetration in contact; NaN without any."""
-    reach = eccentricity(response)
     depth = response["penetration"].values
+    reach, touching = eccentricity(response) - depth, depth > 0.0
     found = np.full(depth.shape[1], np.nan)
-    for joint in range(depth.shape[1]):
-        contact = depth[:, joint] > 0.0
-        if contact.any():
-            found[joint] = np.median(reach[contact, joint] - depth[contact, joint])
+    for joint in np.flatnonzero(touching.any(axis=0)):
+        found[joint] = np.median(reach[touching[:, joint], joint])
     return found
 
 
@@ -156,10 +154,8 @@ def objective_by_turn(response: Results) -> Array:
     gap = np.abs(eccentricity(response) - reaches(response))
     squares = np.zeros(max(len(borders) - 1, 0))
     at = np.interp(borders, angle, time)
-    for joint in range(gap.shape[1]):
-        if np.isnan(gap[:, joint]).any():
-            continue  # no clearance in this joint
-        steps = np.diff(time) * 0.5 * (gap[1:, joint] + gap[:-1, joint])
+    for own in gap.T[~np.isnan(gap).any(axis=0)]:  # of joints with clearance
+        steps = np.diff(time) * 0.5 * (own[1:] + own[:-1])
         total = np.interp(at, time, np.concatenate([[0.0], np.cumsum(steps)]))
         squares += (np.diff(total) / np.diff(at)) ** 2
     return np.sqrt(squares)
