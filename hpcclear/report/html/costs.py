@@ -8,7 +8,7 @@ from hpcclear.report import targets
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, folded
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results, Variable, each
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
@@ -18,7 +18,7 @@ def accuracy(found: Results, content: Content) -> list[object]:
     two, here = ["setting", "result"], "Cheapest integrator for an error of f over one revolution"
     mean = "Cheapest settings for a standard error of f as a steady mean"
     wait = f"the {float(found['spin_up']):.0f} transient revolutions of {targets.REPLICAS} replicas"
-    steady = [[f"{100 * aim:.1f} %", cheapest(found, float(aim))] for aim in found["aim"].values]
+    steady = [[f"{100 * float(k['aim']):.1f} %", cheapest(k)] for k in each(found, "aim")]
     steady.append(["time", f"averaged revolutions and {wait}"])
     tables = [_spending(found), PageTable(two, steady, mean), PageTable(two, advice(found), here)]
     measured = f"{found.attrs['repeats']}; f: {found.attrs['motion']}."
@@ -50,9 +50,8 @@ def _known(value: Variable, digits: str) -> str:
     return format(float(value), digits) if np.isfinite(float(value)) else "–"
 
 
-def cheapest(found: Results, aim: float) -> str:
-    """Return tolerance, revolutions and core time that reach a relative standard error at the least cost."""
-    here = found.isel(aim=int(np.abs(found["aim"].values - aim).argmin()))
+def cheapest(here: Results) -> str:
+    """Return tolerance, revolutions and core time that reach a relative standard error, one ``aim``, at the least cost."""
     seconds = float(here["cheapest_seconds"])
     if not np.isfinite(seconds):
         return "not resolved by the measured revolutions"
