@@ -25,12 +25,10 @@ def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | 
     try:
         with time_limit(LONGEST):
             return make()
-    except (InputError, StorageError):
-        raise
-    except OSError as error:
-        if not isinstance(error, TimeoutError):
-            raise
+    except TimeoutError:
         reason = f"it takes longer than {LONGEST:g} s of processor time"
+    except (InputError, StorageError, OSError):
+        raise
     except Exception as error:  # noqa: BLE001 - whatever strange numbers do, one panel must not cost the page
         reason = f"{type(error).__name__}: {error}"[:200]
     troubles.append(f"{what} was left out: the content cannot be shown ({reason}).")
