@@ -39,9 +39,8 @@ def claims(found: Results) -> list[object]:
     held = f"Of {len(verdicts)} claims {counts[0]} hold on this data, {counts[1]} do not, {counts[2]} are undecided."
     badges = [_BADGES[Verdict(verdict)] for verdict in verdicts]
     texts = [f"{int(one['claim'])}. {text_in(one, 'text')}" for one in each(found, "claim")]
-    rows = zip(texts, badges, strict=True)
     title = "Claims of the paper; claims.nc has the numbers that decide"
-    return [held, PageTable(["claim", "verdict"], rows, title)]
+    return [held, PageTable(["claim", "verdict"], zip(texts, badges, strict=True), title)]
 
 
 def designs_of_a_paper(verified: Results) -> list[object]:
