@@ -107,8 +107,6 @@ def settings(found: Results) -> Way | None:
         way = cheapest(found, numerics.target_error)
         return way and way._replace(words=f"target_error {_short(numerics.target_error)}")
     waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
-    if not isinstance(averaged, int):
-        return None
     near = 1.0 + 1e-9  # as it was written and as it was measured
     looser = np.flatnonzero(tolerance * near >= numerics.rtol)
     if "averaging_error" not in found or not len(looser) or numerics.rtol * near < tolerance.min():
