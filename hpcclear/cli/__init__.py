@@ -85,8 +85,7 @@ def _names() -> list[str]:
 
 
 def _load(name: str) -> Command:
-    command: Command = importlib.import_module(f"{commands.__name__}.{name}").run
-    return command
+    return importlib.import_module(f"{commands.__name__}.{name}").run
 
 
 @click.group(

@@ -15,10 +15,9 @@ from hpcclear.report import figures
 
 @cache
 def _public() -> dict[str, Any]:
-    names = [module.name for module in pkgutil.iter_modules(figures.__path__)]
-    modules = [import_module(f"{figures.__name__}.{name}") for name in names]
-    named = [(name, one) for module in modules for name, one in vars(module).items()]
-    return {name: one for name, one in named if _is_public(name)}
+    found = pkgutil.iter_modules(figures.__path__, f"{figures.__name__}.")
+    modules = [vars(import_module(one.name)) for one in found]
+    return {name: one for own in modules for name, one in own.items() if _is_public(name)}
 
 
 def _is_public(name: str) -> bool:

@@ -186,8 +186,7 @@ def averaged(response: Results) -> Booleans:
     """Return which instants (time,) lie in the averaged revolutions; all where the file does not say."""
     turned = motion.turns(response)
     first = int(response.attrs.get("transient_turns", 0))
-    inside: Booleans = turned - turned[:1] > first - 1e-6
-    return inside
+    return turned - turned[:1] > first - 1e-6
 
 
 def _known(response: Results, name: str, k: int) -> float:

@@ -34,8 +34,7 @@ class DerivedSignal:
 def _second_derivative(time: Array, values: Array) -> Array:
     from scipy.interpolate import make_interp_spline  # takes time to load
 
-    found: Array = make_interp_spline(time, values, k=5).derivative(2)(time)
-    return found
+    return make_interp_spline(time, values, k=5).derivative(2)(time)
 
 
 def _beginnings(time: Array, depth: Array) -> Array:

@@ -54,8 +54,7 @@ class Saving(NamedTuple):
 
 def seconds_of(timing: Results | None) -> Times:
     """Processor times of a sample of each variant; empty where they were not measured."""
-    found: Times = json.loads("{}" if timing is None else timing.attrs.get(SECONDS_BY_ROUND, "{}"))
-    return found
+    return json.loads("{}" if timing is None else timing.attrs.get(SECONDS_BY_ROUND, "{}"))
 
 
 def saving(content: Results, variant: int, seconds: Times) -> Saving:

@@ -169,8 +169,7 @@ class Lettering:
         total = self._total
         ends = np.array([*self._ink.shape] * 2)
         x0, y0, x1, y1 = np.clip(np.rint(boxes).astype(int), 0, ends).T
-        found: Array = total[x1, y1] - total[x0, y1] - total[x1, y0] + total[x0, y0]
-        return found
+        return total[x1, y1] - total[x0, y1] - total[x1, y0] + total[x0, y0]
 
 
 def _sampled(corners: Array) -> Array:

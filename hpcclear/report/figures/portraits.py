@@ -149,8 +149,7 @@ def _turned(angle: Array) -> Array:
 
 def _rolls(angle: Array, contact: Booleans) -> Booleans:
     """Whether the journal stays on the bearing from each instant to the next, shape (n - 1,)."""
-    found: Booleans = contact[:-1] & contact[1:] & (np.abs(_turned(angle)) <= WIDEST)
-    return found
+    return contact[:-1] & contact[1:] & (np.abs(_turned(angle)) <= WIDEST)
 
 
 def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array]:

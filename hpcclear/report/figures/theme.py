@@ -94,8 +94,7 @@ def colour(which: int | str) -> str:
     settings = matplotlib().rcParams
     named = {"ink": "text.color", "paper": "axes.facecolor", "faint": "grid.color"}
     if which in named:
-        found: str = to_hex(settings[named[str(which)]])
-        return found
+        return to_hex(settings[named[str(which)]])
     if which == "grey":
         ends = (np.array(to_rgb(settings[named[name]])) for name in ("ink", "paper"))
         red, green, blue = np.average([*ends], axis=0, weights=[0.54, 0.46])

@@ -106,8 +106,7 @@ def designs(verified: Results, content: Content) -> list[object]:
         every = {name: name for name in texts_in(verified, "design")}
         tables = [table_of(verified, every, SIMULATED, "Designs")]
     remarks = str(verified.attrs.get("remarks", "none"))
-    parts: list[object] = [_WORDS, *tables, *([remarks] if remarks != "none" else [])]
-    return parts
+    return [_WORDS, *tables, *([remarks] if remarks != "none" else [])]
 
 
 def table_of(
