@@ -15,6 +15,7 @@ from hpcclear.scene import Scene
 CHANGED, ACTING = "vermilion", "green"
 """Colours of parts that differ from another design, and of what acts."""
 _KEPT = _FIXED = _OTHER = "grey"
+_HEIGHTS = 55.0, 105.0  # mm, least and most of a drawing
 _MARGIN = 56.0  # points about the mechanism, for dimensions and names
 _PIN = 2.6  # radius of a pin, points; pins are not to scale
 _GAP = 3.0  # to which the largest clearance is enlarged, points
@@ -25,14 +26,12 @@ Acting = tuple[Array, str, str]
 """Places of something that acts, its word and the colour of that."""
 
 
-def height(
-    scene: Scene, poses: Mapping[str, Pose], width: float, ends: tuple[float, float]
-) -> float:
-    """How high a drawing of a width is, within two ends, mm."""
+def height(scene: Scene, poses: Mapping[str, Pose], width: float) -> float:
+    """How high a drawing of a width is, mm."""
     size = np.ptp(Placed(scene.linkage, poses).everything, axis=0)
     margins = 2.0 * _MARGIN * 25.4 / 72.0
     needed = margins + (width - margins) * float(size[1]) / max(float(size[0]), 1e-9)
-    return float(np.clip(needed, *ends))
+    return float(np.clip(needed, *_HEIGHTS))
 
 
 def draw(

@@ -33,7 +33,6 @@ def key(scene: Scene) -> list[str]:
 
 
 _WIDTH, _LINE = 170.0, 3.7  # mm of the figure, and of a line of the key
-_HEIGHTS = 55.0, 105.0  # mm, least and most of the drawing
 _BESIDE = 62.0  # mm of the column of curves
 _COLUMN = 57  # letters of a line
 
@@ -57,7 +56,7 @@ def _sketch(scene: Scene, poses: Mapping[str, Pose]) -> "style.Figure":
     for block in blocks:
         columns[bool(columns[1]) or len(columns[0]) + len(block) > rows + 1].extend(block)
     width = _WIDTH - (_BESIDE if tables else 0.0)
-    drawn = drawing.height(scene, poses, width, _HEIGHTS)
+    drawn = drawing.height(scene, poses, width)
     above = max(drawn, curves.HEIGHT * len(tables))
     height = above + _LINE * (max(map(len, columns)) + 2)
     figure = style.page(height, _WIDTH)
@@ -82,7 +81,7 @@ def mechanism_figure(response: Results, before: Results | None = None) -> "style
     scene, poses = _posed(response)
     other = None if before is None else _posed(before)
     changed = None if other is None else changes(scene, other[0])
-    height = drawing.height(scene, poses, _PICTURE, _HEIGHTS)
+    height = drawing.height(scene, poses, _PICTURE)
     figure = style.page(height, _PICTURE)
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, _LINE / height, 1.0, 1.0 - _LINE / height))
