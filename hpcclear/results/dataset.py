@@ -118,10 +118,9 @@ def _design_row(
         dims, base, start, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", LIMIT
     unit, long_name, _ = DESIGN_VARIABLES.get(base, (None, f"design variable {base}", ""))
     unit = units.get(base, unit)
-    unit = "1" if unit == "" else unit
     if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    row = FileVariable(dims, unit, start + words.get(base, long_name), "f8")
+    row = FileVariable(dims, unit or "1", start + words.get(base, long_name), "f8")
     return row, {"role": role, "scene_path": base}
 
 
