@@ -9,8 +9,9 @@ import report_data as data
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.outcome import Status
-from hpcclear.cli.printing import describe_response
+from hpcclear.cli.printing import describe
 from hpcclear.report import bearings
+from hpcclear.report.html.content import Content
 
 TURN = 2.0 * np.pi
 
@@ -57,7 +58,7 @@ def test_means_are_over_time_whatever_the_instants():
 
 def test_a_failed_simulation_has_no_loads(tmp_path, capsys, details):
     made = response(status=np.int8(Status.STEP_CAP))
-    describe_response(made, tmp_path / "a.nc")
+    describe(Content(tmp_path, {}, {"response": made}), tmp_path / "a.nc")
     shown = capsys.readouterr().out
     assert "peak force" not in shown
 
@@ -99,7 +100,7 @@ def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(
     assert bearings.torque(made).mean == pytest.approx(force)
     made["crank_angle"][:] = np.sin(angle)  # it swings
     assert np.isnan(bearings.torque(made).mean)
-    describe_response(made, tmp_path / "a.nc")
+    describe(Content(tmp_path, {}, {"response": made}), tmp_path / "a.nc")
     assert "largest 814 N m, mean" not in capsys.readouterr().out
 
 

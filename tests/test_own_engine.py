@@ -12,10 +12,11 @@ from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OURS
-from hpcclear.cli.printing import describe_response
+from hpcclear.cli.printing import describe
 from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
 from hpcclear.scene import load_scene
 from hpcclear.scene.describing import implausible
 from hpcclear.study import responses, run_study
@@ -150,7 +151,7 @@ def test_a_response_holds_the_load_that_was_applied(more):
 
 def test_a_peak_between_the_instants_of_the_series_has_its_angle(tmp_path, capsys, details):
     response = hpcclear.simulate(engine("output.instants_per_revolution=12", study=False))
-    describe_response(response, tmp_path / "response.nc")
+    describe(Content(tmp_path, {}, {"response": response}), tmp_path / "response.nc")
     told = " ".join(capsys.readouterr().out.split())
     with labels.in_units_of(response.attrs["scene"]):
         for peak, angle in zip(response.peak_contact_force, response.peak_angle, strict=True):

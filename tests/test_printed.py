@@ -7,9 +7,10 @@ import xarray as xr
 from commands import finish, start
 
 from hpcclear import report
-from hpcclear.cli.printing import describe_response
+from hpcclear.cli.printing import describe
 from hpcclear.report.answer import answer
 from hpcclear.report.figures import motion
+from hpcclear.report.html.content import Content
 
 # -- launchers, and early stops -----------------------------------------------------------------------
 
@@ -85,7 +86,7 @@ def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys, de
     response["contact_force"][:] = force[:, None]
     response["peak_contact_force"][:] = 1500.0
     response.attrs["transient_turns"] = 2
-    describe_response(response, tmp_path / "a.nc")
+    describe(Content(tmp_path, {}, {"response": response}), tmp_path / "a.nc")
     shown = " ".join(capsys.readouterr().out.split())
     assert "Peak force 1.5 kN" in shown
     assert "2 kN" not in shown

@@ -13,7 +13,7 @@ from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
-from hpcclear.cli.printing import describe_response
+from hpcclear.cli.printing import describe
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady import ensemble
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
@@ -23,6 +23,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
+from hpcclear.report.html.content import Content
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -226,7 +227,7 @@ def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys, det
     found = simulate(scene)
     assert found["mean_gap"].shape == (1,)
     assert float(found["objective"]) == float(found["mean_gap"][0]) > 0.0
-    describe_response(found, tmp_path / "a.nc")
+    describe(Content(tmp_path, {}, {"response": found}), tmp_path / "a.nc")
     steady = re.search(r"\nf +([0-9.]+)", capsys.readouterr().out)
     assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
 

@@ -22,7 +22,6 @@ from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of
 from hpcclear.report.spread import Line
 from hpcclear.results import dataset
-from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -71,11 +70,6 @@ def describe_run(found: "Finished", kind: str, asked: Sequence[Line] = ()) -> No
     with contextlib.suppress(InputError):  # it may be written over by another command
         own["timing"] = dataset.read(found.timing, "timing")
     describe(Content(found.output.parent, own), found.output, asked=asked)
-
-
-def describe_response(response: Results, output: Path) -> None:
-    """Print one response (kind ``response``) and its file."""
-    describe(Content(output.parent, {}, {"response": response}), output)
 
 
 def fitted(first: Screen, most: int) -> list[Text]:

@@ -26,12 +26,13 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
         written = written._replace(overrides=overrides)
     scene = loaded(written)
     from hpcclear.base.outcome import Flag, Status
-    from hpcclear.cli.printing import describe_response
+    from hpcclear.cli.printing import describe
     from hpcclear.dynamics import sizing
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulated
     from hpcclear.ensemble.session import Options, Session
     from hpcclear.ranks.boundary import alone
+    from hpcclear.report.html.content import Content
     from hpcclear.results import dataset
     from hpcclear.results.places import Place
 
@@ -43,7 +44,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
             dataset.read(output, "response")  # an earlier response is replaced, and nothing else
         response = simulated(scene)
         dataset.write(response, output)
-    describe_response(response, output)
+    describe(Content(output.parent, {}, {"response": response}), output)
     status = Status(int(response["status"]))
     if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
         cli.say(f"Target missed: {why_missed(response, scene.numerics.target_error)}")
