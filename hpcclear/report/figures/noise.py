@@ -12,8 +12,6 @@ from hpcclear.results.content import Results, Variable, texts_in
 HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
 
-TITLE = "Impacts, mean per revolution"
-
 LOUDEST = 3
 """Third-octave bands that are named, the loudest first."""
 

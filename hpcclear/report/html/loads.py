@@ -37,7 +37,7 @@ def loads(content: Content) -> list[object] | None:
         impacts += [[name, joint, *map(Number, cells)] for joint, *cells in noise.joints(one)]
         further += [[name, *row] for row in _further(one, len(valid) == 1)]
     if impacts:
-        parts.append(_table(["response", *noise.HEADER], impacts, noise.TITLE))
+        parts.append(_table(["response", *noise.HEADER], impacts, "Impacts, mean per revolution"))
     if further:
         parts.append(_table(["response", "quantity", "value"], further, "Further results"))
     for name, one in every.items():
