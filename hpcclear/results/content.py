@@ -63,11 +63,6 @@ class Variable:
         """Sizes of the dimensions."""
         return self.values.shape
 
-    @property
-    def size(self) -> int:
-        """Number of values."""
-        return self.values.size
-
     def __getitem__(self, place: Place | tuple[Place, ...]) -> Any:
         return self.values[place]
 
