@@ -19,6 +19,7 @@ from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import goals, truth
+from hpcclear.study.budget import FIRST
 from hpcclear.study.failures import excess_of
 from hpcclear.study.optimisation import Choice, choices
 from hpcclear.study.run import StudyRun
@@ -42,8 +43,16 @@ class Guesses:
 
     def of(self, choice: Choice, length: int) -> Array:
         """Responses of a design, as `hpcclear.study.truth.made` has them, (k, replicates, `length`)."""
+        first, parts = FIRST, [self._part(choice, FIRST, 0)]
+        while first < length:
+            parts.append(self._part(choice, first, first))
+            first *= 2
+        return np.concatenate(parts, axis=2)
+
+    def _part(self, choice: Choice, length: int, first: int) -> Array:
+        """The same of points from `first` on."""
         names, model = self._run.study.models[-1], self._models[0]
-        points = truth.scattered(self._run, choice, length, "search")
+        points = truth.scattered(self._run, choice, length, "search", first)
         values = points.values[:, [points.names.index(name) for name in names]]
         places = np.clip(to_coordinates(self._run.scene, names, values), model.lower, model.upper)
         f, *further = (one.predict(places) for one in self._models)

@@ -11,6 +11,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import to_coordinates
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth
 from hpcclear.study.budget import FIRST
@@ -22,6 +23,9 @@ from hpcclear.study.run import StudyRun
 Asked = tuple[Array, Array]
 """Objectives and constraints of a design with standard errors, (2, k), and what replicates shift them, (k, replicates)."""
 
+
+BETTER = 0.5
+"""Error by long sequences over that by as many points of short ones, at least: two sequences do not show less."""
 
 GROWN = 1.25
 """Times as many designs from which what the surrogate explains is estimated anew."""
@@ -41,7 +45,7 @@ class Simulated:
         self._guessed: dict[int, Array] = {}
         self._less = dict[tuple[int, ...], Asked]()
         self._slopes = dict[int, Array]()
-        self._parts = dict[tuple[int, int, int], Array]()
+        self._parts = dict[tuple[int, int, int], tuple[Array, Array]]()
         self._rungs = dict[int, int]()
 
     def __len__(self) -> int:
@@ -103,17 +107,19 @@ class Simulated:
 
     def of(self, row: int, end: int, begin: int = 0) -> Asked:
         """A design by some points of each replicate, less what the surrogate says that more points would change."""
-        if not self._guesses:
-            return self._asked(row, end, begin)
         length = end - begin
         key = row, begin, end, self._rung(1), self._rung(length)
         if key not in self._less:
             (found, shifts), slopes = self._asked(row, end, begin), self._explained()
-            guess = partial(self._asked, row, guessed=True)
-            (few, its), (many, their) = guess(end, begin), guess(self._guesses.length)
-            errors = found[1] - (1.0 - self._left(length, slopes)) * spread(shifts)
-            moved = np.array([found[0] - slopes * (few - many)[0], errors])
-            self._less[key] = moved, shifts - slopes[:, None] * (its - their)
+            left, of_nets = self._left(length, slopes)
+            errors = found[1] - (1.0 - left) * spread(shifts)
+            moved = found[0]
+            if self._guesses:
+                guess = partial(self._asked, row, guessed=True)
+                (few, its), (many, their) = guess(end, begin), guess(self._guesses.length)
+                moved = moved - slopes * (few - many)[0]
+                shifts = shifts - slopes[:, None] * (its - their)
+            self._less[key] = np.array([moved, errors]), of_nets[:, None] * shifts
         return self._less[key]
 
     def _rung(self, length: int) -> int:
@@ -123,16 +129,24 @@ class Simulated:
             self._rungs[length] = int(math.log(count) / math.log(GROWN))
         return self._rungs[length]
 
-    def _left(self, length: int, slopes: Array) -> Array:
-        """Part of the errors by so many points that the surrogate does not explain, (k,). It is estimated from all designs
-        together, because the replicates of one design are too few for it."""
+    def _left(self, length: int, slopes: Array) -> tuple[Array, Array]:
+        """Part of the errors by so many points that neither the surrogate explains nor the sequences average out, (k,), and
+        that of what it leaves. Both are estimated from all designs together, because the replicates of one design are too few
+        for it."""
         key = length, self._rung(1), self._rung(length)
         if key not in self._parts:
-            every = (length,), (length, True), (self._guesses.length, True)
-            ours, its, their = (self._shifts(length, *which) for which in every)
-            left = ((ours - slopes[:, None] * (its - their)) ** 2).sum(axis=(0, 2))
-            own = (ours**2).sum(axis=(0, 2))
-            self._parts[key] = np.sqrt(left / np.where(own > 0.0, own, np.inf))
+            own = left = self._shifts(length, length)
+            if self._guesses:
+                its, their = (self._shifts(length, n, True) for n in (length, self._guesses.length))
+                left = own - slopes[:, None] * (its - their)
+            nets = left.reshape(*left.shape[:2], truth.NETS, -1).mean(axis=3)
+            of_nets, of_own, of_left = (
+                np.sqrt((one**2).sum(axis=(0, 2)) / (count * (count - 1)))
+                for one, count in ((nets, truth.NETS), (own, REPLICATES), (left, REPLICATES))
+            )
+            better = np.clip(of_nets / np.where(of_left > 0.0, of_left, np.inf), BETTER, 1.0)
+            explained = of_left / np.where(of_own > 0.0, of_own, np.inf)
+            self._parts[key] = better * explained, better
         return self._parts[key]
 
     def _explained(self) -> Array:

@@ -21,6 +21,10 @@ FIRST = 512
 LOOK = 8
 """Points of each replicate of every verified design, at most; those that decide get more."""
 
+NETS = 2
+"""Sobol sequences that the replicates of a search are consecutive points of: a few long ones integrate better than many of a
+few points, and differences between them say how much better."""
+
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
 
@@ -32,13 +36,14 @@ def scattered(
     other; so many independent samples where that is None.
 
     Every design of a case meets the same scatter in a stage, so that differences between designs are not noise; pairs meet
-    that of the verification.
+    that of the verification. In a search doubled lengths belong together: all replicates are then parts of `NETS`.
     """
     random = run.study.case(choice.case).random
     purpose = "verification" if stage == "pairs" else stage
+    parts = REPLICATES // NETS if stage == "search" else 1
     points = monte_carlo(
-        run.scene, count, random=random, design=dict(choice.design), purpose=purpose,
-        first=first or 0, replicate=None if first is None else range(REPLICATES),
+        run.scene, count * parts, random=random, design=dict(choice.design), purpose=purpose,
+        first=(first or 0) * parts, replicate=None if first is None else range(REPLICATES // parts),
     )  # fmt: skip
     return run.simulations.filled(points.names, points.values, checked=True)
 
