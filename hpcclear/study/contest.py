@@ -40,7 +40,7 @@ def worth_more(
     """Designs that more simulations are worth, but for those `without` which it has to go: in each objective, and in mean + 2
     standard deviations where both are minimised, the least of those that keep the constraints, unless it is known well enough;
     and others without which more than `LOST` is lost as a rule, up to `contest` times its simulations. Where none is decided
-    yet, the least of those that are likely shown to keep them. The baseline, which all are compared with, is known as
+    yet, the least of those that are likely shown to keep them is. The baseline, which all are compared with, is known as
     accurately or gets as many as these."""
     settings, many, found = run.study.verification, verdicts.rivals(choices), set[int]()
     for case in run.study.cases:
@@ -67,7 +67,9 @@ def worth_more(
             else:
                 continue
             first, asked = rows[least], None if number == 0 else direction
-            if not _accurate(run, choices[first], made[first], wanted[first], many[first], asked):
+            if (number == 0 and not holds.any()) or not _accurate(
+                run, choices[first], made[first], wanted[first], many[first], asked
+            ):
                 found.add(first)
             leaders.add(first)
             error = spread(moved - moved[least])

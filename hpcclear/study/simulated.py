@@ -11,7 +11,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import to_coordinates
-from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth
 from hpcclear.study.budget import FIRST
@@ -111,15 +110,15 @@ class Simulated:
         key = row, begin, end, self._rung(1), self._rung(length)
         if key not in self._less:
             (found, shifts), slopes = self._asked(row, end, begin), self._explained()
-            left, of_nets = self._left(length, slopes)
+            left, better = self._left(length, slopes)
             errors = found[1] - (1.0 - left) * spread(shifts)
-            moved = found[0]
+            value = found[0]
             if self._guesses:
                 guess = partial(self._asked, row, guessed=True)
                 (few, its), (many, their) = guess(end, begin), guess(self._guesses.length)
-                moved = moved - slopes * (few - many)[0]
+                value = value - slopes * (few - many)[0]
                 shifts = shifts - slopes[:, None] * (its - their)
-            self._less[key] = np.array([moved, errors]), of_nets[:, None] * shifts
+            self._less[key] = np.array([value, errors]), better[:, None] * shifts
         return self._less[key]
 
     def _rung(self, length: int) -> int:
@@ -130,9 +129,9 @@ class Simulated:
         return self._rungs[length]
 
     def _left(self, length: int, slopes: Array) -> tuple[Array, Array]:
-        """Part of the errors by so many points that neither the surrogate explains nor the sequences average out, (k,), and
-        that of what it leaves. Both are estimated from all designs together, because the replicates of one design are too few
-        for it."""
+        """Part of the errors by so many points that is left of those by as many of short sequences, and the same of what the
+        surrogate does not explain, (k,) each. Both are estimated from all designs together, because the replicates of one
+        design are too few for it."""
         key = length, self._rung(1), self._rung(length)
         if key not in self._parts:
             own = left = self._shifts(length, length)
@@ -140,20 +139,17 @@ class Simulated:
                 its, their = (self._shifts(length, n, True) for n in (length, self._guesses.length))
                 left = own - slopes[:, None] * (its - their)
             nets = left.reshape(*left.shape[:2], truth.NETS, -1).mean(axis=3)
-            of_nets, of_own, of_left = (
-                np.sqrt((one**2).sum(axis=(0, 2)) / (count * (count - 1)))
-                for one, count in ((nets, truth.NETS), (own, REPLICATES), (left, REPLICATES))
-            )
+            of_own, of_left, of_nets = map(_sizes, (own, left, nets))
             better = np.clip(of_nets / np.where(of_left > 0.0, of_left, np.inf), BETTER, 1.0)
-            explained = of_left / np.where(of_own > 0.0, of_own, np.inf)
-            self._parts[key] = better * explained, better
+            self._parts[key] = better * of_left / np.where(of_own > 0.0, of_own, np.inf), better
         return self._parts[key]
 
     def _explained(self) -> Array:
         """How much of what the surrogate shifts is also in the simulations, by the first points of all designs, (k,)."""
         key = self._rung(1)
         if key not in self._slopes:
-            ours, theirs = (self._shifts(1, FIRST, guessed) for guessed in (False, True))
+            ours = self._shifts(1, FIRST)
+            theirs = self._shifts(1, FIRST, guessed=True) if self._guesses else np.zeros_like(ours)
             squares = (theirs**2).sum(axis=(0, 2))
             both = (ours * theirs).sum(axis=(0, 2))
             self._slopes[key] = both / np.where(squares > 0.0, squares, np.inf)
@@ -178,3 +174,9 @@ class Simulated:
             found = np.array([one[:2] for one in rows]).T
             kept[row, begin, end] = found, np.array([one[2] for one in rows])
         return kept[row, begin, end]
+
+
+def _sizes(shifts: Array) -> Array:
+    """Standard errors of all designs together, of what parts shift, (designs, k, parts) to (k,)."""
+    each = [spread(one) for one in np.moveaxis(shifts, 1, 0)]
+    return np.asarray(np.linalg.norm(each, axis=1))
