@@ -14,7 +14,7 @@ from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import truth
+from hpcclear.study import contest, truth
 from hpcclear.study.optimisation import Choice
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
@@ -217,6 +217,26 @@ def test_the_baseline_gets_as_many_simulations_as_the_best(monkeypatch):
     """It cannot be the best, but all changes are measured from it; other given designs stay as they are."""
     assert raced(monkeypatch, 64, last="one original") == [4096, 4096, 4096]
     assert raced(monkeypatch, 64, last="one printed") == [4096, 4096, 512]
+
+
+def test_a_design_is_decided_before_a_verification_ends(monkeypatch):
+    """Both percentiles are known well enough for their accuracy, and neither design is shown to keep its bound."""
+    bound = {"statistic": "quantile", "level": 0.5, "most": 1.0}
+    case = {"random": ["C"], "objectives": ["mean"], "constraints": [bound]}
+    changes = {"study.cases": {"one": case}, "study.accuracy": {"mean": 0.5, "quantile": 0.5}}
+    scene = load_scene(ROBUST).with_(changes | {"study.verification.most_samples": 8192})
+    run = SimpleNamespace(study=scene.required_study)
+    choices = [Choice("", "one", {"m2": 0.2 + 0.01 * k}, origin="search") for k in range(2)]
+    rng = np.random.default_rng(6)
+
+    def drawn(run, some, stage, count, first=0):
+        values = [0.995 + 0.1 * rng.standard_normal((16, count)) for _ in some]
+        return [np.stack([one, np.zeros_like(one)]) for one in values]
+
+    monkeypatch.setattr(truth, "drawn", drawn)
+    made = truth.made(run, choices, drawn(run, choices, "", 32))
+    chances = [contest.shown(run, *one, 2) for one in zip(choices, made, strict=True)]
+    assert max(chances) == 1.0
 
 
 def test_a_design_of_which_little_is_known_is_not_called_as_good():

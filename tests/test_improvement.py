@@ -11,12 +11,14 @@ from formula_study import contents, formula, on_ranks, scene_of
 
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene.domain import box
+from hpcclear.statistics.random.replicates import quantile
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.beliefs import Beliefs, Known, Space
-from hpcclear.study import extent
+from hpcclear.study import extent, truth
 from hpcclear.study.case_search import CaseSearch
+from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.simulated import Simulated
+from hpcclear.study.simulated import BETTER, Simulated
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -292,6 +294,43 @@ def test_scatter_that_the_surrogate_explains_needs_no_simulations():
     (few, errors), (all_, _) = simulated(f, 2, guesses).of(1, 2)[0], simulated(f, 256).of(1, 256)[0]
     np.testing.assert_allclose(few, all_, rtol=1e-9)
     assert errors[0] < 0.2 * simulated(f, 2).of(1, 2)[0][1, 0]
+
+
+def points_of(run, choice, *levels):
+    """Points of a search by replicate, (16, n, inputs), in steps from one length to the next."""
+    made = [truth.scattered(run, choice, size, "search", first).values for first, size in levels]
+    return np.concatenate([one.reshape(16, -1, one.shape[1]) for one in made], axis=1)
+
+
+def test_replicates_of_a_search_are_parts_of_two_long_sequences():
+    """Also as they grow, and where the surrogate averages them."""
+    filled = lambda names, values, checked: SimpleNamespace(names=names, values=values)  # noqa: E731
+    run = SimpleNamespace(
+        study=study().required_study, scene=study(), simulations=SimpleNamespace(filled=filled)
+    )
+    choice = Choice("", "robust", {"m2": 0.2, "m3": 0.1})
+    steps = [(0, 2), (2, 2), (4, 4)]
+    for count, those in ((2, steps[:1]), (8, steps)):
+        clearances = points_of(run, choice, *those)[..., -1].reshape(2, -1)
+        strata = np.sort((clearances - 3e-4) / 7e-4 * 8 * count).astype(int)
+        np.testing.assert_array_equal(strata, [range(8 * count)] * 2)
+    at = run.study.models[-1].index("C")
+    model = SimpleNamespace(lower=-np.inf, upper=np.inf, predict=lambda places: places[:, at])
+    found = Guesses(run, run.study.cases[0], [model], 8).of(choice, 8)
+    own = points_of(run, choice, *steps)[..., -1]
+    assert np.corrcoef(found[0].ravel(), own.ravel())[0, 1] > 0.999999
+
+
+def test_errors_are_of_sequences_and_not_of_their_parts():
+    """Parts differ by where they lie, of which nothing is left in the whole; of noise nothing is averaged out."""
+    places = np.tile((np.arange(128) + 0.5) / 128, 2).reshape(16, 16)
+    noise = np.random.default_rng(5).random((40, 16, 16))
+
+    def left(f):
+        return simulated(f, 16).of(0, 16)[0][1, 0] / quantile(f, 0.9, 0.95).error
+
+    assert left(places) == pytest.approx(BETTER)
+    assert 0.7 < np.mean([left(f) for f in noise]) < 0.9  # of two that never say more than 1
 
 
 def test_first_points_that_designs_were_chosen_for_say_nothing_of_the_bias():
