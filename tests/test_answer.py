@@ -55,6 +55,15 @@ MEAN = [4e-4, 2e-4, 3e-4, 2.015e-4, 1e-4]
 DEVIATION = [6e-5, 4e-5, 2e-5, 4.1e-5, 1e-5]
 
 
+@pytest.mark.parametrize("unknown", ["mean_true", "deviation_true"])
+def test_where_no_design_is_known_none_is_recommended(unknown):
+    """Of a single simulation that did not fail there is a mean and no deviation."""
+    found = verified(MEAN, DEVIATION)
+    found[unknown][:] = np.nan
+    assert told(found) == {}
+    assert screen_of(Content(Path("x"), {"verification": found})) is None
+
+
 def told(content) -> dict[str, str]:
     return {line.label: line.text for line in answer({"verification": content})}
 

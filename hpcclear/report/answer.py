@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.report import alike
 from hpcclear.report.constraints import constraints_of
-from hpcclear.report.merit import best_of, judged, merit, ours_of
+from hpcclear.report.merit import any_counts, best_of, judged, merit, ours_of
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
 from hpcclear.results.content import Results, number_in, text_in
@@ -21,7 +21,7 @@ FAR = 0.2
 def answer(files: Mapping[str, Results]) -> list[Line]:
     """Return the lines of result files by their kind, the most important first; none if no design was verified."""
     verified = files.get("verification")
-    if verified is None or not np.isfinite(verified["mean_true"]).any():
+    if verified is None or not any_counts(verified):
         return []
     ours = ours_of(verified)
     of = Recommended(files, ours, best_of(ours))

@@ -15,8 +15,7 @@ SPAN = 2.0
 
 def recommended(verified: Results) -> str:
     """Return the name of the recommended design; "" if no design was verified."""
-    known = bool(np.isfinite(verified["mean_true"]).any())
-    return str(best_of(ours_of(verified))["design"].item()) if known else ""
+    return text_in(best_of(ours_of(verified)), "design") if any_counts(verified) else ""
 
 
 def role(verified: Results) -> str:
@@ -32,7 +31,7 @@ def goals_of(one: Results) -> list[str]:
 
 def leading_goals(verified: Results) -> list[str]:
     """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
-    if not any(map(counts, each(verified, "design"))):
+    if not any_counts(verified):
         return []
     first = ours_of(verified).isel(design=0)
     return [text_in(first, f"{name}_goal") for name in goals_of(first)]
@@ -66,6 +65,11 @@ def counts(one: Results) -> bool:
     """Return whether a design was simulated and is no design of a publication."""
     finite = np.isfinite(float(one["mean_true"])) and np.isfinite(float(one["deviation_true"]))
     return finite and not labels.is_printed(one)
+
+
+def any_counts(verified: Results) -> bool:
+    """Return whether any design does: without one there is no recommended one."""
+    return any(map(counts, each(verified, "design")))
 
 
 def baseline_of(ours: Results) -> Results | None:

@@ -16,7 +16,15 @@ from hpcclear.report.answer import FAR, MANY, beyond_hertz
 from hpcclear.report.constraints import WORDS, constraints_of, verdict_of
 from hpcclear.report.figures import fits, labels
 from hpcclear.report.html.content import Content, scene_of
-from hpcclear.report.merit import baseline_of, best_of, goals_of, is_plain, ours_of, usual_of
+from hpcclear.report.merit import (
+    any_counts,
+    baseline_of,
+    best_of,
+    goals_of,
+    is_plain,
+    ours_of,
+    usual_of,
+)
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
     TILES,
@@ -53,7 +61,7 @@ _INFEASIBLE = {
 
 def screen(verified: Results, content: Content) -> Screen | None:
     """Return the first screen of a verified study; None where nothing was verified."""
-    if not np.isfinite(verified["mean_true"]).any():
+    if not any_counts(verified):
         return None
     ours = ours_of(verified)
     best, base = best_of(ours), baseline_of(ours)
