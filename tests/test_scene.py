@@ -50,7 +50,9 @@ def test_broken_scene_is_refused_with_key_and_remedy(path: Path) -> None:
 
 def test_what_nothing_of_a_study_reads_is_said() -> None:
     words = "verification.samples=10", "verification.contest=3", "accuracy.exceedance=0.1"
-    said = " ".join(unused(load_scene(ROBUST, [f"study.{one}" for one in words])))
+    words = *(f"study.{one}" for one in words), "numerics.target_revolutions=500"
+    said = " ".join(unused(load_scene(ROBUST, words)))
+    assert "numerics.target_revolutions is not used" in said
     assert "study.verification.contest is not used" in said
     assert "study.accuracy.exceedance is not used" in said
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
 from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
 from hpcclear.results.signals import is_counted
@@ -61,7 +61,8 @@ def read_measured(
     if angle is not None:
         place = np.unwrap(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
     elif seconds is not None:
-        place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
+        with at(key, str(path)):
+            place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
     else:
         remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
         raise InputError(key, str(path), "has neither time nor crank angle", remedy)
@@ -124,7 +125,7 @@ def _frequency(time: Array, values: Array, nominal: float) -> float:
     own = values - values.mean()
     if span * nominal > len(time):
         reason = f"{len(time)} rows for {span * nominal:.3g} revolutions: less than one each"
-        raise InputError("measured table", "time", reason, "Check its unit, or measure more often")
+        raise InputError("", "", reason, "Check its unit, or measure more often")
     if span * nominal < FEWEST or not own.any():
         return nominal
     orders = np.arange(1, 13)

@@ -234,8 +234,11 @@ def warnings(scene: SceneTables) -> Iterator[str]:
 
 
 def unused(scene: SceneTables) -> Iterator[str]:
-    """What a study states and nothing of it reads."""
-    study = scene.study
+    """What a scene and its study state and nothing reads."""
+    numerics, study = scene.numerics, scene.study
+    default = type(numerics).model_fields["target_revolutions"].default
+    if numerics.target_error is None and numerics.target_revolutions != default:
+        yield "numerics.target_revolutions is not used: there is no numerics.target_error"
     if study is None:
         return
     draws, algorithm = study.verification.draws is not None, study.swarm.algorithm
