@@ -101,6 +101,21 @@ def test_nothing_is_aligned_by_a_constant_and_times_that_fall_are_refused(respon
     assert "do not rise" in str(CliRunner().invoke(cli, words).exception)
 
 
+@pytest.mark.parametrize(
+    ("times", "contradicts"), [(1.0, False), (1.05, False), (1e-3, True), (2.0, True)]
+)
+def test_a_time_that_contradicts_the_angle_is_said(response, tmp_path, capsys, times, contradicts):
+    shown = response.isel(time=slice(-400, -50, 3))
+    columns = {
+        "crank_angle [deg]": np.degrees(shown["crank_angle"]) % 360.0,
+        "time [s]": times * shown["time"],
+    }
+    columns["crank_moment"] = shown["crank_moment"]
+    path = table(tmp_path / "m.csv", {name: np.asarray(one) for name, one in columns.items()})
+    compare(response, path)
+    assert ("revolutions by its angle" in capsys.readouterr().err) is contradicts
+
+
 def test_a_cell_that_is_no_number_is_named(tmp_path):
     (tmp_path / "m.csv").write_text("time [s],crank_moment\n0,1\n1,x\n2,3\n")
     with pytest.raises(InputError, match=r"line 3, column crank_moment = 'x'"):

@@ -29,8 +29,14 @@ Alignment = Literal["auto", "angle", "correlation", "none"]
 Curve = Callable[[Array], Array]
 """Values of a series at places (n,) along the axis."""
 
+Places = tuple[Array, Callable[[Array], Array]]
+"""Places of instants along an axis, (t,), and what gives those of measured values."""
+
 LONGEST, SPARSE = 1e5, 100.0
 """Revolutions of a table, and to each of its rows, beyond which its times are taken for a slip of units."""
+
+OTHERWISE = 0.1
+"""Difference of the revolutions that time and angle of a table say, over these, from which they contradict each other."""
 
 SHIFTS = 720
 """Shifts of a revolution that are tried for the largest correlation; the best is refined between its neighbours."""
@@ -154,12 +160,7 @@ def compare(
         remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
         raise InputError("--align", how, f"{path} has no angle", remedy)
     span = float(place[-1])
-    rounds = float(np.ptp(to_place(given))) / span * turns
-    reason = f"has {len(given)} rows for {rounds:.3g} revolutions"
-    if rounds > min(LONGEST, SPARSE * len(given)):
-        raise InputError("measured table", str(path), reason, "Check the unit of its first column")
-    if rounds > len(given):
-        remark(f"Warning: {path} {reason}: is the unit of its first column right?")
+    _check_rounds(sheet, {kind: _places(shown, kind) for kind in sheet.axes}, turns)
     shift, words = _aligned(how, to_place(given), simulated, measured, span, turns)
     at = to_place(given) + shift
     revolution = int(np.mod(at[0], span) / span * turns + 1e-9) % turns + 1
@@ -222,6 +223,26 @@ def _check_names(names: Mapping[str, str], columns: list[SheetColumn]) -> None:
             raise InputError("--name", f"{name}={quantity}", reason, nearest(name, known))
 
 
+def _check_rounds(sheet: Sheet, places: Mapping[str, Places], turns: int) -> None:
+    """InputError where the first axis of a table has far too many revolutions for its rows; a remark where it has many, or
+    where another axis has others. `places`: by axis, of `turns` revolutions."""
+    found = {
+        kind: float(np.ptp(to_place(sheet.si(sheet.axes[kind], AXES[kind], "heading"))) / place[-1]) * turns
+        for kind, (place, to_place) in places.items()
+    }  # fmt: skip
+    (axis, rounds), *others = found.items()
+    rows, path = len(sheet.axes[axis].cells), sheet.path
+    reason = f"has {rows} rows for {rounds:.3g} revolutions"
+    if rounds > min(LONGEST, SPARSE * rows):
+        raise InputError("measured table", path, reason, "Check the unit of its first column")
+    if rounds > rows:
+        remark(f"Warning: {path} {reason}: is the unit of its first column right?")
+    for kind, other in others:
+        if abs(other - rounds) > OTHERWISE * rounds:
+            several = f"{rounds:.3g} revolutions by its {axis}, which is taken, and {other:.3g} by its {kind}"
+            remark(f"Warning: {path} has {several}, at the simulated speed.")
+
+
 def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
     """Kind and column of what a table runs along: the first, where it has time and angle."""
     if not sheet.axes:
@@ -231,7 +252,7 @@ def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
     return next(iter(sheet.axes.items()))
 
 
-def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:
+def _places(response: Results, axis: str) -> Places:
     """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
     if axis == "time":
         time = response["time"].values
