@@ -330,7 +330,7 @@ def test_errors_are_of_sequences_and_not_of_their_parts():
         return simulated(f, 16).of(0, 16)[0][1, 0] / quantile(f, 0.9, 0.95).error
 
     assert left(places) == pytest.approx(BETTER)
-    assert 0.7 < np.mean([left(f) for f in noise]) < 0.9  # of two that never say more than 1
+    assert 0.6 < np.mean([left(f) for f in noise]) < 0.9  # of two that never say more than 1
 
 
 def test_first_points_that_designs_were_chosen_for_say_nothing_of_the_bias():

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.scene.cases import Case
+from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.domain import to_coordinates
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth
@@ -22,9 +22,8 @@ from hpcclear.study.run import StudyRun
 Asked = tuple[Array, Array]
 """Objectives and constraints of a design with standard errors, (2, k), and what replicates shift them, (k, replicates)."""
 
-
-BETTER = 0.5
-"""Error by long sequences over that by as many points of short ones, at least: two sequences do not show less."""
+BETTER = 0.3
+"""Error by long sequences over that by as many points of short ones, at least: two sequences may agree by chance."""
 
 GROWN = 1.25
 """Times as many designs from which what the surrogate explains is estimated anew."""
@@ -41,6 +40,7 @@ class Simulated:
         self.choices = list(start)
         self.made = [truth.nothing(run)] * len(self.choices)
         self._at = {False: dict[tuple[int, ...], Asked](), True: dict[tuple[int, ...], Asked]()}
+        self._halves = dict[tuple[int, ...], Array]()
         self._guessed: dict[int, Array] = {}
         self._less = dict[tuple[int, ...], Asked]()
         self._slopes = dict[int, Array]()
@@ -134,12 +134,14 @@ class Simulated:
         design are too few for it."""
         key = length, self._rung(1), self._rung(length)
         if key not in self._parts:
-            own = left = self._shifts(length, length)
+            own, nets = (left, halves) = self._shifts(length, length), self._apart(length, length)
             if self._guesses:
-                its, their = (self._shifts(length, n, True) for n in (length, self._guesses.length))
+                more = length, self._guesses.length
+                its, their = (self._shifts(length, n, True) for n in more)
                 left = own - slopes[:, None] * (its - their)
-            nets = left.reshape(*left.shape[:2], truth.NETS, -1).mean(axis=3)
-            of_own, of_left, of_nets = map(_sizes, (own, left, nets))
+                its, their = (self._apart(length, n, True) for n in more)
+                nets = halves - slopes * (its - their)
+            of_own, of_left, of_nets = *map(_sizes, (own, left)), np.linalg.norm(nets, axis=0)
             better = np.clip(of_nets / np.where(of_left > 0.0, of_left, np.inf), BETTER, 1.0)
             self._parts[key] = better * of_left / np.where(of_own > 0.0, of_own, np.inf), better
         return self._parts[key]
@@ -159,6 +161,26 @@ class Simulated:
         """Shifts of all designs that have so many points of each replicate at least, 0 of those that failed."""
         rows = np.flatnonzero(self.sizes >= least).tolist()
         return np.nan_to_num([self._asked(k, length, guessed=guessed)[1] for k in rows])
+
+    def _apart(self, least: int, length: int, guessed: bool = False) -> Array:
+        """Half of what the two sequences of the same designs say differently, (designs, k)."""
+        rows = np.flatnonzero(self.sizes >= least).tolist()
+        return np.nan_to_num([self._half(k, length, guessed) for k in rows])
+
+    def _half(self, row: int, length: int, guessed: bool) -> Array:
+        """The same of one design, (k,): of probabilities by what their parts shift, for one sequence alone shows few."""
+        key = guessed, row, length
+        if key not in self._halves:
+            shifts = self._asked(row, length, guessed=guessed)[1]
+            made = (self._guessed if guessed else self.made)[row][..., :length]
+            found = shifts.reshape(len(shifts), truth.NETS, -1).mean(axis=2)
+            for k, goal in enumerate((*self._case.goals, *self._case.kept)):
+                if goal.statistic in ("mean", "deviation", "quantile"):
+                    parts = made[goal.place].reshape(truth.NETS, -1)
+                    size = (abs(goal.most) or 1.0) if isinstance(goal, Constraint) else 1.0
+                    found[k] = goals.guessed(goal, parts, {}) / size
+            self._halves[key] = (found[:, 0] - found[:, 1]) / 2.0
+        return self._halves[key]
 
     def _asked(self, row: int, end: int, begin: int = 0, guessed: bool = False) -> Asked:
         """A design by some points of each replicate, simulated or by the surrogate."""
