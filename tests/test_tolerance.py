@@ -204,14 +204,15 @@ def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeyp
 
 
 def test_each_design_has_its_own_share(tmp_path, monkeypatch):
-    """Half of alpha's samples scatter beyond the largest m2, where f is ten times as wrong."""
-    monkeypatch.setattr(formula, "worse", lambda mass, play: np.where(mass > 0.42, 10.0, 1.0))
+    """Samples of some lie beyond a mass from which f is ten times as wrong."""
+    monkeypatch.setattr(formula, "worse", lambda mass, play: np.where(mass > 0.4, 10.0, 1.0))
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
     found = opened.read(tmp_path / "it" / "verification.nc")
-    inner = found["m2"] < 0.41
-    assert float(found["m2"].sel(design="play alpha")) == pytest.approx(0.42, abs=1e-3)
-    assert (found["mean_tolerance"][~inner.values] > 4.0 * SHARE).all()
-    np.testing.assert_allclose(found["mean_tolerance"][inner.values], SHARE, rtol=0.01)
+    inner, outer = found["m2"].values < 0.39, found["m2"].values > 0.41
+    assert (found["mean_tolerance"][outer] > 4.0 * SHARE).all()
+    np.testing.assert_allclose(found["mean_tolerance"][inner], SHARE, rtol=0.01)
+    assert inner.any()
+    assert outer.any()
 
 
 @pytest.fixture
