@@ -195,6 +195,7 @@ def kinds() -> list[Kind]:
         "page of markup"),
         ("a heading that is none of the scene", "D.csv", text([["m2 [g]", "clearence [mm]"], ["210", "0.3"]]),
         "neither a variable"),
+        ("two units of a column", "F.csv", text([["m2 [g]", "C [mm]"], ["kg", "mm"], ["0.21", "0.3"]]), "the unit below"),
         ("words for an entry of the scene", "E.csv", text([["effects.friction.law", "m2 [g]"], ["coulomb", "210"]]),
          "neither a variable"),
     ]  # fmt: skip

@@ -101,6 +101,19 @@ def test_nothing_is_aligned_by_a_constant_and_times_that_fall_are_refused(respon
     assert "do not rise" in str(CliRunner().invoke(cli, words).exception)
 
 
+def test_angles_that_rise_are_taken_as_they_are_and_text_is_no_quantity(response, tmp_path):
+    shown = response.isel(time=slice(-700, None, 150))
+    force = shown["contact_force"].sel(joint="crank_rod").to_numpy()
+    degrees = np.degrees(np.asarray(shown["crank_angle"]))
+    columns = {"crank_angle [deg]": degrees, "contact_force crank_rod [N]": force}
+    assert np.diff(degrees).min() > 180.0
+    (one,) = compare(response, table(tmp_path / "m.csv", columns)).quantities
+    assert one.norms["relative_rms"] < 1e-9
+    table(tmp_path / "m.csv", columns | {"crank_moment [N m]": np.array(["OVR"] * len(force))})
+    with pytest.raises(InputError, match="OVR"):
+        compare(response, tmp_path / "m.csv")
+
+
 @pytest.mark.parametrize(
     ("times", "contradicts"), [(1.0, False), (1.05, False), (1e-3, True), (2.0, True)]
 )

@@ -83,6 +83,7 @@ def test_words_tables_and_units_of_the_objective() -> None:
         ({"constraints": [{"statistic": "deviation", "of": "frame-force-level-at-1Hz", "most": -1}]}, "constraints.0.most", ""),
         ({"objectives": ["mean", {"statistic": "mean", "of": "mean-gap"}]}, "objectives.1", "'mean': is an objective already"),
         ({"objectives": ["mean", MASS, {"formula": "m2+m3"}]}, "objectives.2", "'m2+m3': is an objective already"),
+        ({"constraints": [{"statistic": "mean", "most": most} for most in (5e-4, 4e-4)]}, "constraints.1", "already"),
         ({"objectives": []}, "objectives", "needs an objective"),
         ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),

@@ -9,6 +9,7 @@ import opened
 import pytest
 from click.testing import CliRunner
 from doc_pages import ROOT
+from refusals import refused
 from test_compare import table
 
 import hpcclear
@@ -103,6 +104,25 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
     slow = table(tmp_path / "t.csv", {"time [s]": 1e4 * time, "crank_moment [N m]": time**2})
     with pytest.raises(InputError, match="less than one each"):
         read_measured(slow, "crank_moment", "N m", SPEED)
+    turns = np.linspace(0.0, 10.0, 200)
+    every = {
+        "crank_angle [deg]": 360.0 * turns,
+        "time [s]": turns / SPEED,
+        "crank_moment [N m]": turns,
+    }
+    for changed, reason in (
+        ({"time [s]": turns / SPEED / 3.0}, "rpm, and the scene"),
+        ({"time [s]": -turns}, "times do not rise"),
+        ({"crank_moment [N m]": np.array(["OVR"] * 200), "speed [rpm]": turns}, "'OVR'"),
+        ({"crank_moment": turns}, "has 2 columns"),
+    ):
+        path = table(tmp_path / "c.csv", every | changed)
+        with refused(said=reason):
+            read_measured(path, "crank_moment", "N m", SPEED)
+    rising = table(
+        tmp_path / "r.csv", {name: one[::15] for name, one in every.items()}
+    )  # by 271 degrees
+    assert read_measured(rising, "crank_moment", "N m", SPEED).frequency == pytest.approx(SPEED)
     for words, reason in (
         ("joints.crank_rod.clearance", "is not PATH=LO:HI"),
         ("joints.crank_rod.clearance=2um:1um", "bounds are crossed"),

@@ -57,6 +57,12 @@ def test_what_nothing_of_a_study_reads_is_said() -> None:
     assert "study.accuracy.exceedance is not used" in said
 
 
+def test_an_entry_that_is_set_to_two_values_is_refused() -> None:
+    with refused("--set", said="'numerics.rtol=1e-6' is given as well"):
+        load_scene(ROBUST, ["numerics.rtol=1e-6", "numerics.rtol=1e-7"])
+    assert load_scene(ROBUST, ["numerics.rtol=1e-7"] * 2).numerics.rtol == 1e-7
+
+
 @pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
 def test_shipped_scene_survives_a_round_trip(path: Path, tmp_path: Path) -> None:
     scene = load_scene(path)

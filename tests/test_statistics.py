@@ -1,5 +1,6 @@
 """Streamed statistics: against plain numpy, in any order of arrival, over stops and numbers of ranks."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from hpcclear.ensemble import identity
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
+from hpcclear.report.html.content import Content
+from hpcclear.report.screens import screen_of
 from hpcclear.results import provenance
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.streams import Accumulator, Summary, columns, rows_of
@@ -127,6 +130,22 @@ def test_all_samples_failed_leaves_nan_not_zero():
     assert np.isnan(content["objective_minimum"])
     failed = content["samples_by_status"].sel(outcome=int(Status.NOT_FINITE))
     assert int(failed) == np.sum(content["samples_by_status"]) == 300
+
+
+def test_the_screen_says_what_the_deviation_is_known_to_and_what_flags_say():
+    """Half-widths hold what 200 samples of many such sets come to; three quarters have a flag."""
+    rng, hold = np.random.default_rng(4), 0
+    for _ in range(100):
+        records = outcomes(200)
+        records["status"], records["flags"] = Status.OK, np.where(np.arange(200) < 150, 2, 0)
+        records["objective"] = 3e-4 + 1e-5 * rng.standard_normal(200)
+        found = statistics_dataset(fill(Accumulator(200, block=128), records, 1))
+        first = screen_of(Content(Path("x"), {"statistics": found}))
+        value, half = re.search(r"deviation ([\d.]+) ± ([\d.]+) µm", first.headline).groups()
+        hold += abs(float(value) - 10.0) <= float(half)
+    assert 85 <= hold <= 99
+    assert first.doubt == "the contact model is outside its range"
+    assert any("75 % of the samples: contact model outside" in one.text for one in first.trust)
 
 
 def test_dataset_round_trip_and_raw_samples(tmp_path):

@@ -14,7 +14,9 @@ from hpcclear.base.plain import plain
 MOST_LISTED = 20
 LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 
-_BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
+_BAD_NAMES = (
+    errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EEXIST, errno.EACCES, errno.EPERM, errno.EROFS,
+)  # fmt: skip
 
 
 _LONG = re.compile(r"(?=[\d.]{16})\d+\.\d+(?:e[-+]\d+)?")

@@ -13,7 +13,7 @@ from hpcclear.results.signals import is_counted
 from hpcclear.scene import Scene
 from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.planar import turns_of
-from hpcclear.scene.sheets import Sheet, read_series
+from hpcclear.scene.sheets import Sheet, read_series, unwrapped
 
 FEWEST = 4
 """Whole revolutions that a table needs: their scatter is the measure of its noise."""
@@ -23,6 +23,9 @@ NYQUIST = 0.4
 
 DRIFT = 0.03
 """Relative difference of the crank's speed from the scene's that the search for its period covers."""
+
+FAR = 0.1
+"""The same from which on a table is not of the scene's machine, or its times are wrong."""
 
 PAIRS = 180
 """Pairs of the curve of a measured pressure."""
@@ -58,8 +61,10 @@ def read_measured(
     values = sheet.si(_column(sheet, name, key), unit, "heading")
     seconds = None if time is None else sheet.si(time, "s", "heading")
     count = is_counted(name)
+    if seconds is not None and (np.diff(seconds) <= 0.0).any():
+        raise InputError(key, str(path), "its times do not rise", "Sort its rows")
     if angle is not None:
-        place = np.unwrap(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
+        place = unwrapped(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
     elif seconds is not None:
         with at(key, str(path)):
             place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
@@ -79,6 +84,13 @@ def read_measured(
     known = frequency
     if seconds is not None:
         known = float((place[-1] - place[0]) / (seconds[-1] - seconds[0]))
+    if abs(known - frequency) > FAR * frequency:
+        reason = (
+            f"its time and angle give {60 * known:.4g} rpm, and the scene {60 * frequency:.4g} rpm"
+        )
+        raise InputError(
+            key, str(path), reason, "Correct the unit of its time, or the drive's speed"
+        )
     highest = min(ORDERS, int(NYQUIST * rate))
     return Measured(name, Spectrum.of(found), angle is not None, known, highest, rate)
 
@@ -111,12 +123,13 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
 
 def _column(sheet: Sheet, name: str, key: str) -> SheetColumn:
     """The column of an option; a table of one signal may call it as it likes."""
-    named = [one for one in sheet.signals if one.name.strip() == name]
+    named = [one for one in sheet.columns if one.name.strip() == name]
     found = named or (sheet.signals if key == "--signal" else [])
     if len(found) == 1:
         return found[0]
     remedy = f"Call one so. It has: {', '.join(one.heading for one in sheet.signals)}"
-    raise InputError(key, sheet.path, f"has no column {name!r}", remedy)
+    reason = f"has {len(named) or 'no'} columns {name!r}"
+    raise InputError(key, sheet.path, reason.replace("no columns", "no column"), remedy)
 
 
 def _frequency(time: Array, values: Array, nominal: float) -> float:

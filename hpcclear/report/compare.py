@@ -19,7 +19,7 @@ from hpcclear.report.figures import motion
 from hpcclear.results.content import Results
 from hpcclear.results.signals import Signal, signals_in
 from hpcclear.scene.delimited import SheetColumn
-from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
+from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series, unwrapped
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,7 +151,7 @@ def compare(
     shown = response.isel(time=np.flatnonzero(inside))
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
-    _check_names(names or {}, sheet.signals)
+    _check_names(names or {}, [*sheet.axes.values(), *sheet.signals])
     pairs = [(column, _signal(shown, column, names or {})) for column in sheet.signals]
     measured = [sheet.si(column, one.unit.removesuffix("1"), "heading") for column, one in pairs]
     simulated = [_curve(place, one) for _, one in pairs]
@@ -259,7 +259,7 @@ def _places(response: Results, axis: str) -> Places:
         return time - time[0], lambda given: given - time[0]
     angle, sense = motion.crank_angle(response)  # times its sense, so that it rises
     first = sense * angle[0]
-    return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
+    return angle - angle[0], lambda given: unwrapped(sense * (given - first))
 
 
 def _signal(response: Results, column: SheetColumn, names: Mapping[str, str]) -> Signal:

@@ -263,7 +263,13 @@ def columns_of(
     below = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]] if body else []
     filled = [cell for cell in below if cell not in NOTHING]
     if filled and all(map(is_unit, filled)):
-        units, body = below, body[1:]
+        units = below
+        for own, heading in zip(units, header, strict=False):
+            stated, plain = parsed_heading(heading)[1], re.compile(r"[\s.*·]")
+            if own not in NOTHING and stated and plain.sub("", stated) != plain.sub("", own):
+                reason = f"is the unit below {heading!r}"
+                raise InputError(f"{path}, line {body[0][0]}", own, reason, "Keep one unit")
+        body = body[1:]
     cells = [_row(path, number, header, one, width, separator) for number, one in body]
     if not cells:
         raise InputError(what, str(path), f"contains no points ({found})", "Give each point a row")

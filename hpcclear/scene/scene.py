@@ -60,8 +60,12 @@ def load_scene(
     else:
         text = file_text(Path(source), "scene file", "Give the path of a TOML scene file")
         content = parse(text, str(source))
+    given = dict[str, str]()
     for override in overrides:
-        content = entry_replaced(content, *_override(override))
+        key, value = _override(override)
+        if given.setdefault(key, override) != override:
+            raise InputError("--set", override, f"{given[key]!r} is given as well", "Keep one")
+        content = entry_replaced(content, key, value)
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     named, read_as = files_named(content), list[Reading]()
     if named:

@@ -17,6 +17,7 @@ import numpy as np
 from hpcclear.base import units
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at, nearest
+from hpcclear.base.remarks import remark
 from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import NOTHING, SheetColumn, Stored, columns_of, decimal_of
 from hpcclear.scene.workbook import cells_of
@@ -262,7 +263,18 @@ def read_series(path: Path) -> Sheet:
     if len(sheet.axes) + len(sheet.signals) < 2 or len(sheet.lines) < 3:
         reason = "has no series: an axis, a quantity and three rows are needed"
         raise InputError("measured table", str(path), reason, "Give time or angle, then quantities")
+    for column in sheet.columns:
+        if delimited.is_unit(column.unit) and sheet.is_text(column) and not sheet.is_clock(column):
+            if not any(column.cells):
+                remark(f"Note: column {column.heading} of {path} is empty")
+            else:
+                sheet.number(column, next(k for k, cell in enumerate(column.cells) if cell))
     return sheet
+
+
+def unwrapped(angle: Array) -> Array:
+    """Angles (n,), rad, that go on beyond a turn: as they are where they rise all along, however large their steps."""
+    return angle if (np.diff(angle) > 0.0).all() else np.unwrap(angle)
 
 
 def plain_unit(unit: str, target: str) -> str:

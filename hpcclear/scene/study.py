@@ -133,13 +133,18 @@ class Study(StudyTables):
             count = len(case.goals)
             reason = f"case {case.name} has {count} objectives, each with a best design of its own"
             raise invalid(reason, f"Request {count} solutions or more", "swarm.archive")
-        met = list[object]()
+        met = set[object]()
         for place, goal in case.rows.items():
-            key = f"cases.{case.name}.{place}"
-            if place.startswith("objectives") and goal.alike(self.objective) in met:
-                said = "is an objective already", "Remove it, or name another objective"
+            key, kind = (
+                f"cases.{case.name}.{place}",
+                "objective" if place[0] == "o" else "constraint",
+            )
+            alike = kind, goal.alike(self.objective)
+            if alike in met:
+                article = "an" if kind == "objective" else "a"
+                said = f"is {article} {kind} already", f"Remove it, or name another {kind}"
                 raise invalid(*said, key, goal.formula or goal.statistic)
-            met.append(goal.alike(self.objective))
+            met.add(alike)
             for name in () if goal.formula is None else names_in(goal.formula):
                 with at(f"{key}.formula", goal.formula):
                     check_known(name, own, "is no design variable of this case")

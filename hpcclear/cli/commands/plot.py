@@ -78,6 +78,8 @@ def run(
     cli.check_mode("--animation", animation is not None, its_own=("seconds", "revolutions"))
     cli.check_mode("--output", output is not None, its_own=("kind", "texts", "names", *look))
     content = read(*places)
+    for text in content.troubles:
+        cli.say(f"Warning: {text}")
     for name in designs:
         _known("--design", name, content.responses)
     responses = {n: one for n, one in content.responses.items() if n in designs or not designs}

@@ -1,6 +1,6 @@
 """First screens of many simulations: samples, their sums, maps of motion and bifurcation diagrams."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -81,20 +81,25 @@ def _trust(found: Results) -> Iterator[Trust]:
     if good.all():
         yield green("No simulation failed", "quality")
     outside = bearings.outside(found) or "forces are indicative"
-    for flag, text in (
-        (Flag.BEYOND_HERTZ, f"contact model outside its range, {outside}"),
-        (Flag.LATCHED, "a joint never left contact, f may depend on the integration tolerance"),
-        (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
-    ):
-        if share := _share(found, flag):
-            level = red if share > MOST and flag is not Flag.LATCHED else amber
-            yield level(f"{spread.percent(share)} of the samples: {text}", "quality")
+    yield from _flagged({flag: _share(found, flag) for flag in Flag}, outside)
     name = "objective_limit" if "objective_limit" in found else "objective_uncertainty"
     if not np.isfinite(found[name].values).any():
         text = "The half-width of a single f was not checked (numerics.target_error)"
         yield amber(text, "quality")
     if "sampling" not in found.attrs:
         yield amber("The designs were chosen, not drawn: no intervals", "quality")
+
+
+def _flagged(shares: Mapping[Flag, float], outside: str) -> Iterator[Trust]:
+    """What flags say, by the share of samples that have each; `outside`: of the contact model's range, in words."""
+    for flag, text in (
+        (Flag.BEYOND_HERTZ, f"contact model outside its range, {outside}"),
+        (Flag.LATCHED, "a joint never left contact, f may depend on the integration tolerance"),
+        (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
+    ):
+        if share := shares[flag]:
+            level = red if share > MOST and flag is not Flag.LATCHED else amber
+            yield level(f"{spread.percent(share)} of the samples: {text}", "quality")
 
 
 def map_of_motion(found: Results, content: Content) -> Screen:
@@ -165,11 +170,30 @@ def statistics(found: Results, content: Content) -> Screen:
     if number > 1:
         mean, deviation = (float(found[f"objective_{n}"]) for n in ("mean", "deviation"))
         unit = str(found["objective_mean"].attrs["units"])
-        half = student(CONFIDENCE, number - 1) * deviation / number**0.5
-        shown = labels.with_half_width(mean, half, unit), labels.quantity(deviation, unit)
+        errors = deviation / number**0.5, _error_of_deviation(found)
+        halves = (student(CONFIDENCE, number - 1) * error for error in errors)
+        pairs = zip((mean, deviation), halves, strict=True)
+        shown = [labels.with_half_width(*one, unit) for one in pairs]
         headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
     level = amber if good < total else green
+    counts = found["samples_by_flag"]
+    shares = {flag: float(counts.sel(flags=int(flag))) / max(total, 1) for flag in Flag}
     lost = level(f"{good} of {total} simulations without failure", "quality")
     single = amber("The half-width of a single f was not checked", "quality")
-    about, trust = (f"f: {labels.objective(found)}",), trusted([lost, single])
-    return Screen(labels.sentence(headline, found), about, trust=trust)
+    trust = [lost, *_flagged(shares, "forces are indicative"), single]
+    outside = shares[Flag.BEYOND_HERTZ] > MOST
+    doubt = "the contact model is outside its range" if outside else ""
+    about, headline = (f"f: {labels.objective(found)}",), labels.sentence(headline, found)
+    return Screen(headline, about, doubt, trust=trusted(trust, outside))
+
+
+def _error_of_deviation(found: Results) -> float:
+    """Standard error of the standard deviation of f, by the fourth moment of its histogram."""
+    parts = ("mean", "deviation", "count", "minimum", "maximum", "edges", "histogram")
+    mean, deviation, count, least, most, edges, histogram = (
+        found[f"objective_{part}"].values for part in parts
+    )
+    places = np.concatenate([[least], (edges[1:] + edges[:-1]) / 2.0, [most]])
+    fourth = float(histogram @ (places - mean) ** 4 / count)
+    square = max(fourth - float(deviation) ** 4, 0.0) / float(count)
+    return float(square**0.5 / (2.0 * deviation)) if deviation > 0.0 else 0.0
