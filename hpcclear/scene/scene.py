@@ -2,8 +2,6 @@
 
 import contextlib
 import json
-import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -26,11 +24,9 @@ from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import PHYSICAL, files_named, flatten, of_kinds, replace
 from hpcclear.scene.plugged import check_trust, texts_of, with_texts
 from hpcclear.scene.study import Study, with_open_parameter
-from hpcclear.scene.syntax import DEEPEST, file_text, parse
+from hpcclear.scene.syntax import dotted, file_text, overriding, parse
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.variables import StudyVariable
-
-_KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 
 
 def load_scene(
@@ -60,11 +56,7 @@ def load_scene(
     else:
         text = file_text(Path(source), "scene file", "Give the path of a TOML scene file")
         content = parse(text, str(source))
-    given = dict[str, str]()
-    for override in overrides:
-        key, value = _override(override)
-        if given.setdefault(key, override) != override:
-            raise InputError("--set", override, f"{given[key]!r} is given as well", "Keep one")
+    for key, value in overriding(overrides):
         content = entry_replaced(content, key, value)
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     named, read_as = files_named(content), list[Reading]()
@@ -100,24 +92,6 @@ def _beside(folder: Path, module: str) -> str | None:
     if not path.exists():
         return None
     return file_text(path, "Python file", "Give a plug-in in Python").replace("\r\n", "\n")
-
-
-def _override(text: str) -> tuple[str, object]:
-    key, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not dotted(key):
-        reason = "is not of the form key.path=value"
-        raise InputError("--set", text, reason, "Write, say, --set numerics.rtol=1e-8")
-    try:
-        parsed = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        parsed = {}
-    # A value with a line break could smuggle in a second key; then it is just a string.
-    return key, parsed["value"] if parsed.keys() == {"value"} else value
-
-
-def dotted(path: object) -> bool:
-    """Whether this is a dotted path, no deeper than a scene may be."""
-    return isinstance(path, str) and _KEY.fullmatch(path) is not None and path.count(".") < DEEPEST
 
 
 class Scene(ConsistentTables):

@@ -3,13 +3,14 @@
 import itertools
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, content_of
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
+_KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 _SHORTER = "Scenes have a few thousand bytes"
 # tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
 # is parsed.
@@ -177,3 +178,31 @@ def parse(text: str, name: str) -> dict[str, object]:
         raise InputError(*where, "is nested too deeply", f"Nest at most {DEEPEST} levels") from None
     except ValueError as error:
         raise InputError(*where, *fault(text.replace("\r\n", "\n"), error)) from None
+
+
+def overriding(overrides: Sequence[str]) -> Iterator[tuple[str, object]]:
+    """Keys and values of ``"key.path=value"`` entries. Raises InputError of what is no such entry, or set to two values."""
+    given = dict[str, str]()
+    for override in overrides:
+        key, value = _override(override)
+        if given.setdefault(key, override) != override:
+            raise InputError("--set", override, f"{given[key]!r} is given as well", "Keep one")
+        yield key, value
+
+
+def _override(text: str) -> tuple[str, object]:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not dotted(key):
+        reason = "is not of the form key.path=value"
+        raise InputError("--set", text, reason, "Write, say, --set numerics.rtol=1e-8")
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError):
+        parsed = {}
+    # A value with a line break could smuggle in a second key; then it is just a string.
+    return key, parsed["value"] if parsed.keys() == {"value"} else value
+
+
+def dotted(path: object) -> bool:
+    """Whether this is a dotted path, no deeper than a scene may be."""
+    return isinstance(path, str) and _KEY.fullmatch(path) is not None and path.count(".") < DEEPEST
