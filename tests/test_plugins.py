@@ -12,8 +12,8 @@ from commands import warm_command
 from test_own_objectives import GOALS
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli import cli
-from hpcclear.cli.options import Written, loaded
+from hpcclear.cli import cli, loaded
+from hpcclear.cli.options import Written
 from hpcclear.ensemble.identity import run_key
 from hpcclear.plugins import Registry, run_source, trusting, using
 from hpcclear.scene import load_scene

@@ -57,10 +57,12 @@ def test_what_nothing_of_a_study_reads_is_said() -> None:
     assert "study.accuracy.exceedance is not used" in said
 
 
-def test_an_entry_that_is_set_to_two_values_is_refused() -> None:
-    with refused("--set", said="'numerics.rtol=1e-6' is given as well"):
-        load_scene(ROBUST, ["numerics.rtol=1e-6", "numerics.rtol=1e-7"])
-    assert load_scene(ROBUST, ["numerics.rtol=1e-7"] * 2).numerics.rtol == 1e-7
+def test_of_two_values_of_an_entry_the_last_counts_and_that_is_said(capsys) -> None:
+    scene = load_scene(ROBUST, ["numerics.rtol=1.5e-6", "numerics.rtol=1.5e-7"])
+    assert scene.numerics.rtol == 1.5e-7
+    assert "numerics.rtol=1.5e-7 replaces numerics.rtol=1.5e-6" in capsys.readouterr().err
+    load_scene(ROBUST, ["numerics.rtol=1.5e-7"] * 2)
+    assert not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)

@@ -151,7 +151,8 @@ def compare(
     shown = response.isel(time=np.flatnonzero(inside))
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
-    _check_names(names or {}, [*sheet.axes.values(), *sheet.signals])
+    times = [sheet.axes["time"]] if "time" in sheet.axes else []
+    _check_names(names or {}, [*times, *sheet.signals])
     pairs = [(column, _signal(shown, column, names or {})) for column in sheet.signals]
     measured = [sheet.si(column, one.unit.removesuffix("1"), "heading") for column, one in pairs]
     simulated = [_curve(place, one) for _, one in pairs]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, content_of
+from hpcclear.base.remarks import remark
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
@@ -181,12 +182,14 @@ def parse(text: str, name: str) -> dict[str, object]:
 
 
 def overriding(overrides: Sequence[str]) -> Iterator[tuple[str, object]]:
-    """Keys and values of ``"key.path=value"`` entries. Raises InputError of what is no such entry, or set to two values."""
+    """Keys and values of ``"key.path=value"`` entries; of two for one entry the last counts, and a remark says so. Raises
+    InputError of what is no such entry."""
     given = dict[str, str]()
     for override in overrides:
         key, value = _override(override)
-        if given.setdefault(key, override) != override:
-            raise InputError("--set", override, f"{given[key]!r} is given as well", "Keep one")
+        if given.get(key, override) != override:
+            remark(f"Note: {override} replaces {given[key]}")
+        given[key] = override
         yield key, value
 
 
