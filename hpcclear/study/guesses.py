@@ -42,21 +42,23 @@ class Guesses:
         return bool(self._models)
 
     def of(self, choice: Choice, length: int) -> Array:
-        """Responses of a design, as `hpcclear.study.truth.made` has them, (k, replicates, `length`)."""
-        first, parts = FIRST, [self._part(choice, FIRST, 0)]
-        while first < length:
-            parts.append(self._part(choice, first, first))
-            first *= 2
-        return np.concatenate(parts, axis=2)
+        """Responses of a design, as `hpcclear.study.truth.made` has them, (k, replicates, `length`): of a power of two."""
+        each, spans = REPLICATES // truth.NETS, [(0, FIRST)]
+        while spans[-1][1] < length:
+            spans.append((spans[-1][1], 2 * spans[-1][1]))
+        # a design that grows gets its points a doubling at a time, each in the order of the replicates
+        parts = [np.arange(each * a, each * b).reshape(each, b - a) for a, b in spans]
+        found = self._of_sequences(choice, length)[..., np.concatenate(parts, axis=1)]
+        return found.reshape(len(found), REPLICATES, length)
 
-    def _part(self, choice: Choice, length: int, first: int) -> Array:
-        """The same of points from `first` on."""
+    def _of_sequences(self, choice: Choice, length: int) -> Array:
+        """The same by sequences, (k, `NETS`, all points of each)."""
         names, model = self._run.study.models[-1], self._models[0]
-        points = truth.scattered(self._run, choice, length, "search", first)
+        points = truth.scattered(self._run, choice, length, "search")
         values = points.values[:, [points.names.index(name) for name in names]]
         places = np.clip(to_coordinates(self._run.scene, names, values), model.lower, model.upper)
         f, *further = (one.predict(places) for one in self._models)
-        return np.reshape([f, np.zeros(len(f)), *further], (-1, REPLICATES, length))
+        return np.reshape([f, np.zeros(len(f)), *further], (2 + len(further), truth.NETS, -1))
 
     def trends(self, region: Box, rng: np.random.Generator) -> list[Callable[[Array], Array]]:
         """What objectives, then constraints, come to by the surrogate, of designs (n, d) to (n,) each."""
@@ -75,6 +77,7 @@ class Guesses:
         ]
 
     def _columns(self, choice: Choice) -> list[float]:
-        values, design = self.of(choice, TRENDS), choice.design
+        values, design = self._of_sequences(choice, TRENDS), choice.design
+        values = values.reshape(len(values), REPLICATES, TRENDS)
         found = [goals.goal_value(one, values, design, 0.95).value for one in self._case.goals]
         return found + [excess_of(one, values, design).value for one in self._case.kept]
