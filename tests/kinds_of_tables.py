@@ -148,6 +148,7 @@ def kinds() -> list[Kind]:
         ("row numbers", "j.csv", text([["No.", *HEAD], ["1", *DESIGNS[0]], ["2", *DESIGNS[1]]], ";"), IN_SI),
         ("units in a second row", "k.csv", text([["m2", "C", "drive.speed"], ["g", "mm", "1/min"], *DESIGNS], ";", True),
         IN_SI),
+        ("units in headings and in a second row", "k2.csv", text([HEAD, ["g", "mm", "rpm"], *DESIGNS], ";"), IN_SI),
         ("units in a second row, in brackets, beside names", "l.csv",
          text([["part", "m2", "C", "drive.speed"], ["-", "[g]", "[mm]", "[rpm]"], ["A", *DESIGNS[0]], ["B", *DESIGNS[1]]]),
          IN_SI),

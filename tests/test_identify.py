@@ -119,6 +119,8 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
         path = table(tmp_path / "c.csv", every | changed)
         with refused(said=reason):
             read_measured(path, "crank_moment", "N m", SPEED)
+    driven = table(tmp_path / "c.csv", every | {"time [s]": turns / SPEED / 1.2})
+    assert read_measured(driven, "crank_moment", "N m", SPEED, given=False).frequency > 1.1 * SPEED
     rising = table(
         tmp_path / "r.csv", {name: one[::15] for name, one in every.items()}
     )  # by 271 degrees

@@ -16,7 +16,7 @@ import hpcclear
 from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime
-from hpcclear.cli import cli
+from hpcclear.cli import cli, main
 from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
 from hpcclear.ensemble.maps import SHAPE
 from hpcclear.ranks.boundary import alone
@@ -213,3 +213,16 @@ def test_a_poincare_section_has_at_least_200_points_or_is_not_drawn():
     late = many.assign_attrs(transient_turns=5)
     with pytest.raises(InputError, match="averaged_revolutions=200"):
         drawings({}, {"a": late})["poincare"]()
+
+
+def test_a_file_that_is_left_out_is_named_and_no_file_becomes_a_directory(tmp_path, capsys):
+    opened.write(data.response(), tmp_path / "response.nc")
+    (tmp_path / "samples.nc").write_text("no results")
+    before = (tmp_path / "response.nc").read_bytes()
+    with pytest.raises(SystemExit) as ended:
+        main(["plot", str(tmp_path), "-o", str(tmp_path / "response.nc")])
+    told = " ".join(capsys.readouterr().err.split())
+    assert ended.value.code == 2
+    assert "samples.nc was left out" in told
+    assert "response.nc': File exists" in told
+    assert (tmp_path / "response.nc").read_bytes() == before

@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import Finished, Options, Session
@@ -70,7 +71,8 @@ def _identified(
     every = tuple(dict.fromkeys((*settings.names, *usual)))
     units = {name: signal(response, name, "--of").unit for name in every}
     turns = turns_of(plain.linkage)
-    how, names = (frequency, turns, sense), settings.names
+    given = linkage_of(plain).mechanism.period.prescribed  # else its speed may be unknown as well
+    how, names = (frequency, turns, sense, "--signal", given), settings.names
     tables = [[read_measured(path, n, units[n], *how) for n in names] for path in settings.signals]
     size, ranks, sensor = settings.size(), session.ranks, settings.sensor
     # refuses before anything is simulated

@@ -49,12 +49,13 @@ class Measured:
 
 def read_measured(
     path: Path, name: str, unit: str, frequency: float, turns: int = 1, sense: int = 1, key: str = "--signal",
+    given: bool = True,
 ) -> Measured:  # fmt: skip
     """Read a signal from a table: columns ``time [s]`` or ``crank_angle [deg]``, or both, and signals by their names.
 
     `frequency`: of a revolution of the drive in the scene, Hz; `turns`, `sense`: turns of the crank in it, and -1 where the
-    crank turns clockwise; `key`: the option, for errors. Raises InputError: the table cannot be read, lacks the signal, or has
-    too few revolutions.
+    crank turns clockwise; `key`: the option, for errors; `given`: whether the drive keeps to that frequency. Raises InputError:
+    the table cannot be read, lacks the signal, has too few revolutions, or contradicts the frequency.
     """
     sheet = read_series(path)
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
@@ -84,7 +85,7 @@ def read_measured(
     known = frequency
     if seconds is not None:
         known = float((place[-1] - place[0]) / (seconds[-1] - seconds[0]))
-    if abs(known - frequency) > FAR * frequency:
+    if given and abs(known - frequency) > FAR * frequency:
         reason = (
             f"its time and angle give {60 * known:.4g} rpm, and the scene {60 * frequency:.4g} rpm"
         )

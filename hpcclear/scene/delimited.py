@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from hpcclear.base.errors import InputError, content_of
 from hpcclear.base.plain import counted
-from hpcclear.base.units import is_unit, may_be_thousands
+from hpcclear.base.units import factor, fits, is_unit, may_be_thousands
 from hpcclear.scene import clock
 
 LARGEST_FILE = 200_000_000
@@ -265,8 +265,9 @@ def columns_of(
     if filled and all(map(is_unit, filled)):
         units = below
         for own, heading in zip(units, header, strict=False):
-            stated, plain = parsed_heading(heading)[1], re.compile(r"[\s.*·]")
-            if own not in NOTHING and stated and plain.sub("", stated) != plain.sub("", own):
+            stated = parsed_heading(heading)[1]
+            alike = own in NOTHING or not stated or (fits(own, stated) and factor(own, stated) == 1)
+            if not alike:
                 reason = f"is the unit below {heading!r}"
                 raise InputError(f"{path}, line {body[0][0]}", own, reason, "Keep one unit")
         body = body[1:]
