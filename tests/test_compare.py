@@ -78,6 +78,7 @@ def test_norms_are_those_of_the_errors_that_were_made(response, tmp_path):
         ("time [s],crank_momnt", "Did you mean 'crank_moment'"),
         ("time [s]", "no series"),
         ("time [s],crank_moment [N m],crank_moment [kN mm]", "another column is crank_moment"),
+        ("time [s],time [ms],crank_moment [N m]", "another column is time"),
     ],
 )
 def test_a_table_that_cannot_be_compared_is_refused(response, tmp_path, head, reason):

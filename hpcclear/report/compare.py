@@ -152,7 +152,7 @@ def compare(
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
     times = [sheet.axes["time"]] if "time" in sheet.axes else []
-    _check_names(names or {}, [*times, *sheet.signals])
+    _check_names(names or {}, sheet.signals, times)
     pairs = [(column, _signal(shown, column, names or {})) for column in sheet.signals]
     measured = [sheet.si(column, one.unit.removesuffix("1"), "heading") for column, one in pairs]
     simulated = [_curve(place, one) for _, one in pairs]
@@ -211,10 +211,13 @@ def _measured_axis(response: Results, axis: str, given: Array, at: Array, every:
     return x
 
 
-def _check_names(names: Mapping[str, str], columns: list[SheetColumn]) -> None:
-    """InputError unless each named column is one of the table's, by its heading or without its unit, and no two are alike."""
+def _check_names(
+    names: Mapping[str, str], columns: list[SheetColumn], times: list[SheetColumn]
+) -> None:
+    """InputError unless each named column is one of the table's, by its heading or without its unit, and no two are alike;
+    `times`: the column of times, if there is one."""
     for k, one in enumerate(columns):
-        if one.name in (other.name for other in columns[:k]):
+        if one.name in (other.name for other in [*times, *columns[:k]]):
             reason = f"another column is {one.name} as well"
             raise InputError("heading", one.heading, reason, "Keep one, or name one otherwise")
     known = [name for one in columns for name in dict.fromkeys((one.name, one.heading))]
