@@ -1,5 +1,6 @@
 """A real Chromium, headless, driven over the WebDriver protocol with the standard library alone."""
 
+import contextlib
 import json
 import shutil
 import subprocess
@@ -156,6 +157,9 @@ class Browser:
             self._ask("DELETE", "")
         finally:
             self._driver.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._driver.wait(10)
+            self._driver.kill()  # its session has ended; some drivers do not hear the first signal
             self._driver.wait(crowded(20))
             assert self._driver.stdout is not None
             self._driver.stdout.close()
