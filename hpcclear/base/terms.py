@@ -1,4 +1,4 @@
-"""Terms of a motion, and what may be asked of the motion by what adds terms to it: loads, effects of joints, contacts.
+"""Terms of a motion, and the quantities of it that are there for what adds terms: loads, effects of joints, contacts.
 
 Zeros disappear, signs move outwards, and nothing else is rearranged.
 """

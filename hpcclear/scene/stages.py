@@ -142,7 +142,7 @@ class Swarm(Table):
 
 
 class MomentAccuracy(Table):
-    """Half-widths of confidence intervals, relative: of the recommended design in what its case asks for, and of the best in
+    """Half-widths of confidence intervals, relative: of the recommended design in what its case requires, and of the best in
     each objective. Others are simulated as long as they may be better."""
 
     mean: Share = 0.002

@@ -98,7 +98,7 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
 
 
 def _followed(run: StudyRun, scene: Scene, name: str) -> Results:
-    """Lives of a scene, kept in a file of the study's directory."""
+    """Service lives of a scene, kept in a file of the study's directory."""
     timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
     options = Options(style=run.simulations.style)
     return run_wear(scene, run.directory / name, run.ranks, options, timing).content

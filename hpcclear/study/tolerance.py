@@ -134,7 +134,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
 def _undone(
     run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], true: Result
 ) -> set[int]:
-    """Rows of the designs that keep their constraints by samples, but not surely with what the tolerance takes."""
+    """Rows of the designs that keep their constraints by samples, but not significantly with what the tolerance takes."""
     settings, many, found = run.study.verification, verdicts.rivals(designs), set[int]()
     if settings.draws is not None:
         return found
@@ -209,7 +209,7 @@ def _lengthened(
 
 
 def _hidden(run: StudyRun, choice: Choice, whole: Array, error: Array) -> bool:
-    """Whether what the tolerance takes is not known well enough yet, in what the case of a design asks for."""
+    """Whether what the tolerance takes is not known well enough yet, in what the case of a design requires."""
     wanted, case = run.study.wanted, run.study.case(choice.case)
     moved = _shares(run, choice, whole, np.zeros_like(error), error)[1][3:]
     estimates = contest.goals_of(run, choice, whole)

@@ -113,7 +113,7 @@ def generate(
 
 
 class _Generator(MotionEquations):
-    """Writes a whole motion: equations, and what effects and outputs ask for besides."""
+    """Writes a whole motion: equations, and what effects and outputs require besides."""
 
     def motion(self) -> Motion:
         for k, contact in enumerate(self.mechanism.contacts):

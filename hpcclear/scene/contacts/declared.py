@@ -54,7 +54,7 @@ class ContactGeometry(Table):
     """Its entry for the length at right angles to the plane, and the part that has it."""
 
     def own(self, *entries: str) -> tuple[Any, ...]:
-        """Values of entries that only some of its tables have, or that are given where this is asked."""
+        """Values of entries that only some of its tables have."""
         return tuple(getattr(self, entry) for entry in entries)
 
     @property

@@ -24,7 +24,7 @@ from hpcclear.base.student import student
 from hpcclear.statistics.surrogate.metrics import ROUNDING
 
 REPLICATES = 16
-"""Scramblings of a design. With fewer, Student's quantile makes intervals wider than the error needs: 1.09 times here, 1.21
+"""Replicates of a design. With fewer, Student's quantile makes intervals wider than the error needs: 1.09 times here, 1.21
 with 8. With more, each sequence is shorter and the indices scatter more."""
 
 
