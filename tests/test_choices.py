@@ -181,7 +181,7 @@ REFUSED = {
     "no such entry": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.m3.width"}},
                       {"m3": {"distribution": "uniform", "half_width": 0.01}}, "no entry of a random input"),
     "not given": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.m3.deviation"}},
-                  {"m3": {"distribution": "uniform", "half_width": 0.01}}, "has no standard deviation"),
+                  {"m3": {"distribution": "uniform", "half_width": 0.01}}, "has no deviation"),
     "too wide": ({"m3": M3, "t": {"range": [1e-3, 0.2], "path": "random.m3.half_width"}},
                  {"m3": {"distribution": "uniform", "mean": 0.15, "half_width": 0.01}}, "wider than its domain"),
     "share of a ratio": ({"I2": {"ratio": [1, 4]}}, {"I2": {"distribution": "uniform", "half_width": "3 %"}}, "a share"),

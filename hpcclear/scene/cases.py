@@ -218,7 +218,7 @@ class Case(Table):
         if not NAME.fullmatch(self.name):  # it stands in names of files, figures and pages
             raise invalid("is not a name", "Use a letter, then letters, digits or _", key="name")
         if not self.random:
-            raise invalid("without random inputs f has no standard deviation", "Name some", "random")
+            raise invalid("without random inputs f does not scatter", "Name some", "random")
         if len(set(self.random)) < len(self.random):
             raise invalid("a random input is named twice", "Remove one", key="random")
         rows = self.goals
