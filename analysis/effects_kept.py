@@ -42,7 +42,7 @@ from hpcclear.results.names import ALL_ON
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.paired import Change, deviation_change, mean_change
-from hpcclear.study.extent import certificate_extent, samples_of
+from hpcclear.study.stages import certificate_extent, samples_of
 
 TOLERANCES = (0.01, 0.02, 0.05)
 OBJECTIVES = (

@@ -36,9 +36,9 @@ from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.syntax import parse
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
-from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
+from hpcclear.study.stages import certificate_extent
 
 JOBS = Path(__file__).parent.parent / "jobs"
 SCENE = JOBS / "slider_crank.toml"
@@ -523,7 +523,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
         ranks = alone()
         simulations = Simulations(scene, ranks, checkpoint, "quiet")
         run = StudyRun(scene, tmp_path, ranks, checkpoint, simulations, told.append)
-        stage.certify(run, certificate_extent)
+        stage.certify(run, certificate_extent(scene, 128))
         return run, (tmp_path / "effects.nc").read_bytes()
 
     first, written = once()

@@ -9,7 +9,7 @@ from formula_study import formula, scene_of
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.study import extent, forecast, simulations
+from hpcclear.study import forecast, simulations, stages
 
 STUDY = """
 [variables]
@@ -65,7 +65,7 @@ def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
 def test_without_a_pilot_the_most_is_said():
     """Where it would take long, or its designs make no mechanism."""
     scene = scene_of(STUDY)
-    most = sum(extent.samples_of(scene).values())
+    most = sum(stages.samples_of(scene).values())
 
     def refused(points):
         raise InputError("points", 1, "make no mechanism", "Narrow the ranges")

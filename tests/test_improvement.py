@@ -14,7 +14,7 @@ from hpcclear.scene.domain import box
 from hpcclear.statistics.random.replicates import quantile
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.beliefs import Beliefs, Known, Space
-from hpcclear.study import extent, truth
+from hpcclear.study import stages, truth
 from hpcclear.study.case_search import CaseSearch
 from hpcclear.study.guesses import Guesses
 from hpcclear.study.optimisation import Choice
@@ -275,7 +275,7 @@ def test_a_search_ends_at_the_front(done):
     assert float(alpha["first_true"]) <= 1.005 * float(found["first_true"].min())  # or lighter
     assert not any("averaged" in name for name in found["design"].to_numpy())
     samples = opened.read(done / "samples.nc", "samples").sizes["sample"]
-    assert samples < sum(extent.samples_of(study()).values())
+    assert samples < sum(stages.samples_of(study()).values())
 
 
 def simulated(f, length, guesses=()):

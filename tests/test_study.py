@@ -20,7 +20,7 @@ from hpcclear.report.html.page import write_report
 from hpcclear.report.merit import recommended
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.statistics.surrogate.stored import models_in
-from hpcclear.study import chaos, extent, responses, run_study
+from hpcclear.study import chaos, responses, run_study, stages
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.claims import ResponseEvidence
 from hpcclear.study.paper.printed import is_the_papers, printed_designs
@@ -268,14 +268,14 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
     monkeypatch.setattr(leading, "run_points", counted)
     monkeypatch.setattr(responses, "simulated", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-    said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
+    said = {stage: count for stage, count in stages.samples_of(scene).items() if count}
     at_most = ("search", "verification", "pairs", "chaos") if len(overrides) > 1 else ("chaos",)
     for stage in at_most:  # rounds may win nothing, fronts be short, ends be one design, designs that win nothing have 64
         assert 0.2 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]
     assert dict(made) == said
     # what is recommended is an end, or not
-    assert 0.7 * extent.responses_of(scene) < responded["all"] <= extent.responses_of(scene)
+    assert 0.7 * stages.responses_of(scene) < responded["all"] <= stages.responses_of(scene)
 
 
 def test_the_share_of_chaos_is_that_of_the_pairs():

@@ -15,7 +15,7 @@ from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.pooled import together
-from hpcclear.study import extent, run_study, simulations, tolerance, truth
+from hpcclear.study import run_study, simulations, stages, tolerance, truth
 from hpcclear.study.optimisation import Choice
 
 STUDY = """
@@ -235,7 +235,7 @@ def test_pairs_are_of_points_that_are_verified_anyway(tmp_path, made):
     _, once = np.unique(found["m2"], return_index=True)
     assert made["verification", 1e-4] == found["samples"][once].sum()
     pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
-    assert pairs == 64 * len(np.unique(found["m2"])) <= extent.samples_of(scene_of())["pairs"]
+    assert pairs == 64 * len(np.unique(found["m2"])) <= stages.samples_of(scene_of())["pairs"]
     assert [rtol for stage, rtol in made if stage == "pairs"] == pytest.approx([1e-6])
 
 
@@ -246,7 +246,7 @@ def test_without_an_accuracy_limits_hold_the_tolerance_too(tmp_path, made, overr
     scene = load_scene(tomllib.loads(bare), [override])
     run_study(scene, tmp_path / "it", alone(), progress_style="quiet")
     pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
-    assert 0 < pairs <= extent.samples_of(scene)["pairs"]
+    assert 0 < pairs <= stages.samples_of(scene)["pairs"]
     assert pairs < 0.04 * sum(made.values())
     found = opened.read(tmp_path / "it" / "verification.nc")
     np.testing.assert_allclose(found["mean_tolerance"], SHARE, rtol=1e-3)

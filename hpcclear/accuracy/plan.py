@@ -31,7 +31,7 @@ from hpcclear.ranks.terminal import Style
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of
-from hpcclear.study import extent, forecast, lives
+from hpcclear.study import forecast, lives, stages
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -161,7 +161,7 @@ def measure(
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
     rows: list[Row] = []
     whole: int | None = None
-    single = extent.responses_of(scene) if study.cases else 0
+    single = stages.responses_of(scene) if study.cases else 0
 
     def made() -> Plan:
         peak, startup = host.peak_memory(), process_age_at_start()

@@ -37,7 +37,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points, expanded
 from hpcclear.study import launched, lives, optimisation
-from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 from hpcclear.study.stages import announcer, carry_out, files_of
@@ -126,7 +125,7 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     where = scene, session.place.output, session.ranks, checkpoint, simulations
     run = StudyRun(*where, session.notify, announcer(scene, style))
     with saving(checkpoint.flush):  # samples of small stages wait for the next save
-        carry_out(run, certificate_extent)
+        carry_out(run)
     return run.times
 
 

@@ -50,7 +50,7 @@ def effects(
     """
     from hpcclear.ensemble.effects import run_effects
     from hpcclear.ensemble.trial import Wanted
-    from hpcclear.study.extent import certificate_extent
+    from hpcclear.study.stages import certificate_extent
 
     wanted = Wanted(tolerance, *certificate_extent(scene, samples), forces)
     run = partial(run_effects, scene, wanted=wanted)

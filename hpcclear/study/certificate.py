@@ -1,7 +1,6 @@
 """The effect screening as a stage of a study: which effects it could do without."""
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 
@@ -14,15 +13,12 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study.run import Result, StudyRun
 
-Extent = Callable[[Scene, int | None], tuple[int, float]]
-"""Samples of each variant at most, and of the whole scene that all come to, by scene and requested number."""
 
-
-def certify(run: StudyRun, extent: Extent) -> None:
+def certify(run: StudyRun, extent: tuple[int, float]) -> None:
     """Simulate with effects on and off, each design of it kept by itself; write effects.nc and report what can be left out.
 
-    `extent`: as `hpcclear.study.extent.certificate_extent`. Raises InputError if no effect of the scene can be off, or its
-    objective is zero.
+    `extent`: samples of each variant at most, and of the whole scene that all come to. Raises InputError if no effect of the
+    scene can be off, or its objective is zero.
     """
     asked = run.study.certificate
     assert asked is not None
@@ -33,7 +29,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
 
     run.announce("effects")
     with run.ranks.stage("effects"):
-        plan = trial.plan(Wanted(asked.tolerance, *extent(run.scene, asked.samples), asked.forces))
+        plan = trial.plan(Wanted(asked.tolerance, *extent, asked.forces))
         found = trial.certify(plan, simulate)
     content = effects_dataset(trial, found, {})
     run.write(content)

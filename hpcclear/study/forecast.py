@@ -1,6 +1,6 @@
 """What a study simulates as a rule, and what a simulation of it costs: it is rehearsed on surrogates of a few simulations.
 
-`hpcclear.study.extent.samples_of` has the most that there can be. How much search and verification take less than that depends
+`hpcclear.study.stages.samples_of` has the most that there can be. How much search and verification take less than that depends
 on f, so both are carried out as they are, on what surrogates of a pilot's simulations say in place of simulations. What these
 surrogates do not explain is in it as waves that are too short for any model.
 """
@@ -27,7 +27,7 @@ from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import extent, optimisation, rare, search, stages, surrogates, truth
+from hpcclear.study import optimisation, rare, search, stages, surrogates, truth
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations, loads_of
 
@@ -147,10 +147,10 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     """Simulations that a study with cases takes as a rule, to two digits, and what one of them costs on one core.
 
     Where fewer than `LEAST` simulations per input take longer than `LONGEST`, designs of the pilot make no mechanisms, or
-    worn clearances are needed that are not known yet, these are `hpcclear.study.extent.samples_of` and `seconds`, the cost
+    worn clearances are needed that are not known yet, these are `hpcclear.study.stages.samples_of` and `seconds`, the cost
     as far as it is known without a pilot. `evaluate`: from points to records of the study's objective.
     """
-    study, samples = scene.required_study, extent.samples_of(scene)
+    study, samples = scene.required_study, stages.samples_of(scene)
     loads = loads_of(scene)
     most = int(LONGEST / max(seconds * loads, 1e-9))
     least, looked = LEAST * len(study.models[-1]), REPLICATES * LENGTH

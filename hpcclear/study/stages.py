@@ -3,15 +3,18 @@
 Resuming, announcements, plans and the files of a finished study all go by this one list.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from hpcclear.ensemble import effects
 from hpcclear.ranks.progress import duration
 from hpcclear.ranks.terminal import Style, announce
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study
+from hpcclear.scene.switches import switches
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
     budget,
@@ -32,11 +35,11 @@ from hpcclear.study import (
     verification,
     worst,
 )
-from hpcclear.study.certificate import Extent
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper import claims, readings
 from hpcclear.study.paper.printed import is_the_papers, printed_designs, printed_moments
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.simulations import loads_of
 from hpcclear.study.verification import Verified
 
 
@@ -48,8 +51,8 @@ class Stage:
     run: Callable[..., Any]
     """Does it, from the run and the results of `needs`; what it returns is its result."""
     needs: tuple[str, ...] = ()
-    """Stages, all of them earlier, whose results it takes: None for one that does not apply. Beside them
-    there are "scene", as it was written, and "extent", which counts what the effect screening may take."""
+    """Stages, all of them earlier, whose results it takes: None for one that does not apply. Beside them there is "scene", as
+    it was written."""
     applies: Callable[[Scene], bool] = lambda scene: True
     """Whether a study of this scene has it."""
     words: Mapping[str, str] = field(default_factory=dict)
@@ -186,7 +189,8 @@ STAGES = (
         words={"wear": "wear over the service life"}, samples=_samples("wear", lives.simulations),
     ),
     Stage(
-        "effects", certificate.certify, needs=("extent",),
+        "effects",
+        lambda run: certificate.certify(run, certificate_extent(run.scene, run.study.certificate.samples)),
         applies=_of_study(lambda study: study.certificate is not None),
         words={"effects": "effect screening"}, writes=("effects",),
     ),
@@ -260,10 +264,9 @@ def files_of(scene: Scene) -> list[str]:
     return [f"{kind}.nc" for stage in stages_of(scene) for kind in stage.writes]
 
 
-def carry_out(run: StudyRun, extent: Extent) -> None:
-    """All stages, in their order, of a run of the scene as written; `extent`: how much the effect screening simulates
-    (`hpcclear.study.extent.certificate_extent`)."""
-    results: dict[str, object] = {"scene": run.scene, "extent": extent}
+def carry_out(run: StudyRun) -> None:
+    """All stages, in their order, of a run of the scene as written."""
+    results: dict[str, object] = {"scene": run.scene}
     for stage in stages_of(run.scene):
         arguments = [results.get(name) for name in stage.needs]
         results[stage.name] = stage.run(results.get("wear", run), *arguments)
@@ -283,3 +286,61 @@ def announcer(scene: Scene, style: Style) -> Callable[[str], None]:
                 announce(text, style)
 
     return announced
+
+
+# ---- how much they simulate together ----
+
+
+def samples_of(scene: Scene) -> dict[str, int]:
+    """Samples on the ranks by stage, if no surface or model is refused.
+
+    The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
+    accuracy verified designs are taken to need what the paper's did. Raises InputError if the scene has no study.
+    """
+    found = _of_stages(scene)
+    asked = scene.required_study.certificate
+    if asked is not None:
+        most = certificate_samples(scene) if asked.samples is None else asked.samples
+        found["effects"] = most * _variants(scene)
+    return found
+
+
+def _of_stages(scene: Scene) -> dict[str, int]:
+    """The same of all stages but the effect screening, whose size goes by theirs."""
+    loads = loads_of(scene)
+    return {part: loads * count for stage in STAGES for part, count in stage.samples(scene).items()}
+
+
+def responses_of(scene: Scene) -> int:
+    """Single responses, which root simulates alone. Raises InputError if the scene has no study."""
+    return sum(stage.responses(scene) for stage in STAGES)
+
+
+CERTIFICATE_SHARE = 0.05
+"""Of a study's samples that its effect screening may take."""
+
+
+def certificate_extent(scene: Scene, samples: int | None = None) -> tuple[int, float]:
+    """Samples of each variant at most, and of the whole scene that all come to by their work (infinite for none at most).
+
+    Where `samples` names no number, effects that are decided early leave their budget to the others.
+    """
+    if samples is not None or scene.study is None:
+        return effects.SAMPLES if samples is None else samples, math.inf
+    return effects.SAMPLES, float(certificate_samples(scene) * _variants(scene))
+
+
+def certificate_samples(scene: Scene) -> int:
+    """Samples of a variant, for an effect screening that takes a small share of the study it serves.
+
+    Counted are the whole scene, each effect by itself and one set of them; never fewer than a first look needs.
+    """
+    study = scene.required_study
+    total = sum(_of_stages(scene).values()) if study.cases else study.samples
+    share = CERTIFICATE_SHARE * total / _variants(scene)
+    return int(min(max(share, effects.LEAST), effects.SAMPLES))
+
+
+def _variants(scene: Scene) -> int:
+    """Variants that an effect screening simulates as a rule."""
+    return len(switches(scene)) + 2

@@ -48,7 +48,7 @@ def run(
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted
-        from hpcclear.study.extent import certificate_extent
+        from hpcclear.study.stages import certificate_extent
 
         allowed = tolerance_of(tolerance)
         if reduced is not None:
