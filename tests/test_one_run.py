@@ -17,7 +17,7 @@ from formula_study import whole as study_scene
 from patience import crowded
 from streaming_run import make_made_up
 
-from hpcclear.accuracy.profile import PROFILES
+from hpcclear.accuracy.profile import QUICK
 from hpcclear.accuracy.run import run_accuracy
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
@@ -90,7 +90,7 @@ def effects(place: Path) -> None:
 
 
 def accuracy(place: Path) -> None:
-    run_accuracy(scene("slider_crank.toml"), place, alone(), PROFILES["quick"], str, QUIET)
+    run_accuracy(scene("slider_crank.toml"), place, alone(), QUICK, str, QUIET)
 
 
 def simulate(place: Path) -> None:

@@ -60,7 +60,3 @@ QUICK = Profile(
     simulations=512,
     strong_seconds=1.0,
 )
-
-FULL = Profile()
-
-PROFILES = {profile.name: profile for profile in (QUICK, FULL)}

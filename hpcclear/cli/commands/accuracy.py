@@ -60,7 +60,7 @@ def _measure(
 ) -> None:
     with cli.on_ranks(time_limit) as ranks:
         scene = loaded(written)
-        from hpcclear.accuracy.profile import PROFILES
+        from hpcclear.accuracy.profile import QUICK, Profile
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.printing import describe
         from hpcclear.ensemble.session import Options
@@ -70,7 +70,7 @@ def _measure(
         def notify(text: str) -> None:
             announce(f"accuracy: {text}")
 
-        profile = PROFILES["quick" if quick else "full"]
+        profile = QUICK if quick else Profile()
         place = cli.place_of(output)
         found, drawn = run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh))
         describe(Content(place, {"accuracy": found}), *list(drawn.values())[:1])
