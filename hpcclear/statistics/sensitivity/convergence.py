@@ -31,6 +31,12 @@ from scipy.special import stdtrit
 from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.statistics.sensitivity.intervals import SensitivityHistory
 
+CONFIDENCE = 0.99
+"""Of each comparison, which is two-sided."""
+TOLERANCE = 0.02
+"""Relative change of a derivative that counts as none. It matters for an f without scatter, whose standard errors are small;
+the change is part of the uncertainty."""
+
 
 @dataclass(frozen=True)
 class ConvergenceIntervals:
@@ -49,14 +55,8 @@ class ConvergenceIntervals:
     standard error and the truncation that may be left. NaN where not determined."""
 
 
-def convergence_intervals(
-    history: SensitivityHistory, *, confidence: float = 0.99, tolerance: float = 0.02
-) -> ConvergenceIntervals:
-    """Find where each sensitivity stopped changing (rule: module text; paper: 4.2, step 1), by two-sided comparisons.
-
-    `tolerance`: relative change of a derivative that counts as none, at least 0. It matters for an f without scatter, whose
-    standard errors are small; the change is part of the uncertainty.
-    """
+def convergence_intervals(history: SensitivityHistory) -> ConvergenceIntervals:
+    """Find where each sensitivity stopped changing (rule: module text; paper: 4.2, step 1)."""
     _, *shape = history.sensitivity.shape
     interval, plateau = np.full((2, *shape), -1, np.int64)
     estimate = np.full((2, *shape), np.nan)
@@ -65,12 +65,12 @@ def convergence_intervals(
         usable = np.flatnonzero(np.isfinite(history.standard_error[:, c, j]))
         slope, error = history.sensitivity[usable, c, j], history.standard_error[usable, c, j]
         freedom = history.degrees_of_freedom[usable, c]
-        start = _plateau_start(slope, error, _student(freedom, 1.0 - confidence), tolerance)
+        start = _plateau_start(slope, error, _student(freedom, 1.0 - CONFIDENCE))
         if start >= len(usable) - 1:
             continue  # a plateau needs two
         plateau[c, j] = usable[start]
         uncertainty = _uncertainty(slope, error, lengths[usable] ** history.order)
-        critical = _student(freedom, (1.0 - confidence) / (len(usable) - 1))
+        critical = _student(freedom, (1.0 - CONFIDENCE) / (len(usable) - 1))
         sure = np.abs(slope) > critical * uncertainty
         sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
         determined = start + 1 + np.flatnonzero((sure[1:] & sure_before)[start:])
@@ -105,14 +105,14 @@ def _student(freedom: Integers, doubt: float) -> Array:
     return np.asarray(stdtrit(freedom, 1.0 - doubt / 2.0))
 
 
-def _plateau_start(slope: Array, error: Array, critical: Array, tolerance: float) -> int:
+def _plateau_start(slope: Array, error: Array, critical: Array) -> int:
     """The widest interval from which on all estimates agree: the last if none does."""
     start = len(slope) - 1
     while start > 0:
         wide, short = start - 1, slice(start, None)
         quantile = np.maximum(critical[wide], critical[short])
         chance = quantile * np.hypot(error[wide], error[short])
-        allowed = np.maximum(chance, tolerance * np.abs(slope[short]))
+        allowed = np.maximum(chance, TOLERANCE * np.abs(slope[short]))
         if np.any(np.abs(slope[wide] - slope[short]) > allowed):
             break
         start -= 1

@@ -26,6 +26,11 @@ from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array, Booleans
 
+CONFIDENCE = 0.99
+"""Of each comparison, which is two-sided."""
+SHARE = 0.5
+"""Of the clearances at which a variable that is selected is influential, at least."""
+
 
 class Selection(NamedTuple):
     """Ranking and selection; m columns, each a variable in a surface."""
@@ -37,30 +42,24 @@ class Selection(NamedTuple):
 
 
 def select_influential(
-    names: Sequence[str],
-    effects: ArrayLike,
-    errors: ArrayLike,
-    *,
-    fraction: float = 0.1,
-    confidence: float = 0.99,
-    share: float = 0.5,
+    names: Sequence[str], effects: ArrayLike, errors: ArrayLike, *, fraction: float = 0.1
 ) -> Selection:
     """Rank the variables and select those with great influence (rule: module text).
 
     `names`: variable of each of m columns, a name may come more than once; `effects` (c, m): derivatives at each clearance
     times the lengths of the global intervals, NaN for no estimate, and their standard `errors`. `fraction`: of the largest
-    effect, `share`: of the clearances, both in (0, 1]; each comparison is two-sided.
+    effect, in (0, 1].
     """
     effect, effect_error = np.abs(np.asarray(effects, float)), np.asarray(errors, float)
     known = np.isfinite(effect) & np.isfinite(effect_error)
     effect, effect_error = np.where(known, effect, np.nan), np.where(known, effect_error, np.nan)
-    margin = float(ndtri(0.5 + confidence / 2.0)) * effect_error
+    margin = float(ndtri(0.5 + CONFIDENCE / 2.0)) * effect_error
     distinct = effect > margin
     largest = np.max(effect, axis=1, where=distinct, initial=0.0)[:, np.newaxis]
     threshold = np.where(largest > 0.0, fraction * largest, np.nan)  # all comparisons then fail
     reached = _mean_known(distinct & (effect >= threshold), known)
     relative = _mean_known(effect / np.where(largest > 0.0, largest, np.nan), known)
-    order = [j for j in np.argsort(-relative, kind="stable") if reached[j] >= share]
+    order = [j for j in np.argsort(-relative, kind="stable") if reached[j] >= SHARE]
     return Selection(effect, tuple(dict.fromkeys(names[j] for j in order)))
 
 
