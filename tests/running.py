@@ -10,6 +10,7 @@ from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 from some_laws import row
 
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.recorded.steps import Recording, Steps
 from hpcclear.dynamics.layout.views import Outcome
@@ -30,6 +31,8 @@ RIGID = {
     "effects.friction": {"law": "none"},
 }
 """No joint has clearance."""
+BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}
+"""On the energy residual of every scene over what passed, by the tolerance, over ten revolutions."""
 KERNEL_ORDER = [X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI]
 
 
@@ -211,3 +214,12 @@ def energy_residual(scene: Scene, result: Run) -> tuple[float, float]:
     return after - before - drive - load + lost, passed + abs(lost) + abs(load) + abs(
         after - before
     )
+
+
+def closes(scene: Scene) -> Run:
+    """What a scene gives that ends well, with its energy closed."""
+    result = run(scene)
+    assert result.out.status == Status.OK
+    rest, passed = energy_residual(scene, result)
+    assert abs(rest) < BOUNDS[scene.numerics.rtol] * passed
+    return result

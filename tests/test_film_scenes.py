@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from refusals import refused
-from running import SCENE, energy_residual, run, scene_with
+from running import SCENE, closes, run, scene_with
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
@@ -14,7 +14,6 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
 
 JOINTS = ("crank_rod", "rod_slider")
-CLOSED = 2e-5  # the bound of the library of hard scenes at 1e-6
 OIL = {"viscosity": "10 mPa*s", "length": "20 mm", "model": "short"}
 
 
@@ -23,15 +22,6 @@ def oiled(rtol=1e-6, clearance="0.1 mm", joints=JOINTS, **film):
     changes = {f"joints.{joint}.film": OIL | film for joint in joints}
     changes |= {f"joints.{joint}.clearance": clearance for joint in JOINTS}
     return scene_with(changes | {"numerics.energy": True}, 2, rtol)
-
-
-def closes(scene):
-    """What a scene gives that ends well, with its energy closed."""
-    result = run(scene)
-    assert result.out.status == Status.OK
-    rest, passed = energy_residual(scene, result)
-    assert abs(rest) < CLOSED * passed
-    return result
 
 
 # ---- hard cases: each ends as it says, and its energy closes ---------------------------------------------
