@@ -213,8 +213,7 @@ def run_accuracy(
         if session.has_all([FILE]):
             content = dataset.read(place.output / FILE, "accuracy")
         else:
-            session.describe(scene)
-            store = session.opened()
+            store = session.opened(scene)
             content = Panels(scene, ranks, profile, notify, store, draw).measured()
             content.attrs.update(session.attributes)
             dataset.write(content, place.output / FILE)

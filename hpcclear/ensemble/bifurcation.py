@@ -97,7 +97,6 @@ def run_bifurcation(
     key = {**sample_key(scene, points), "command": "bifurcation", "observation": repr(observation)}
 
     def make(session: Session) -> Results:
-        session.describe(scene)
         changes = {
             "study": None,
             "numerics.target_error": None,
@@ -108,7 +107,7 @@ def run_bifurcation(
         long = scene.with_(changes)
         short = simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
         asked = long, variants, observation, (count,), ranks, "bifurcation"
-        observed = responses_of(*asked, checkpoint=session.opened())[:, 0]
+        observed = responses_of(*asked, checkpoint=session.opened(scene))[:, 0]
         coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
         data = {points.names[0]: varied, "observed": observed}
         about = session.attributes, points.units, observation.described(short), points.words

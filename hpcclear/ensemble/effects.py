@@ -62,8 +62,7 @@ def run_effects(
 
 
 def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
-    session.describe(trial.scene)
-    checkpoint = session.opened(trial.drawn.points(0, 1).units)
+    checkpoint = session.opened(trial.scene, trial.drawn.points(0, 1).units)
     first = 0
     announce(f"compiling {len(trial.switches) + 1} variants", session.options.style)
     session.ranks.everywhere("compile", compile_share, trial.payloads())

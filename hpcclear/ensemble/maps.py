@@ -110,8 +110,7 @@ def run_map(
     key = {**sample_key(scene, points), "command": "map"}
 
     def make(session: Session) -> Results:
-        session.describe(scene, mapped=True)
-        checkpoint = session.opened(points.units)
+        checkpoint = session.opened(scene, points.units, mapped=True)
         where, kind = (ranks, checkpoint, Progress("cells", options.style)), session.record
         records = sample_points(scene, points, *where, stage="map", maker=make_mapper, record=kind)
         attributes = {**session.attributes, SHAPE: " ".join(map(str, shape))}

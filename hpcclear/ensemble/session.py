@@ -70,7 +70,7 @@ class Session:
     """One run at its place, on root: a context in which no other run works there.
 
     `key`: what makes the run what it is (`hpcclear.ensemble.identity`); `notify` gets what was found on disk and could not be
-    used, a sentence at a time. `attributes`: of every file of results, what made them, and the key; empty before `describe`;
+    used, a sentence at a time. `attributes`: of every file of results, what made them, and the key; empty before `opened`;
     `joints`, `record`: labels of the joints, and type of the records of samples.
     """
 
@@ -145,8 +145,11 @@ class Session:
         self.joints, self.record = scene.joint_labels, record_of(scene, mapped)
         self.attributes = {**scene.origin, **program(), **key_attribute(self.key)}
 
-    def opened(self, units: Mapping[str, str] | None = None) -> Checkpoint:
-        """What an earlier run left unfinished; `units`: of its design variables, by their names."""
+    def opened(
+        self, scene: Scene, units: Mapping[str, str] | None = None, mapped: bool = False
+    ) -> Checkpoint:
+        """What an earlier run left unfinished; `units`: of its design variables, by their names; others as of `describe`."""
+        self.describe(scene, mapped)
         with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts, self.key, interval=self.options.interval, units=units,
@@ -320,11 +323,10 @@ def run_sample(
 
 def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
     """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
-    session.describe(scene)
     if (memory := len(points) * MEMORY) >= NOTABLE:
         text = f"root keeps all {len(points)} samples in memory, {memory:.1f} GB at the end; Monte Carlo samples it can write"
         session.notify(f"{text} as they come: --statistics --raw DIR")
-    checkpoint = session.opened(points.units)
+    checkpoint = session.opened(scene, points.units)
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)
     records["sample"] += first

@@ -119,10 +119,9 @@ class _Streaming:
     def __init__(
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
     ) -> None:
-        session.describe(scene)
         self._payload, self._objective = payload_of(scene, points.page(0)), scene.objective
         self._points, self._session, self._raw = points, session, raw
-        self._checkpoint = session.opened()
+        self._checkpoint = session.opened(scene)
         self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
         session.notify_problems()

@@ -225,8 +225,8 @@ def run_wear(
     states = States(scene, inputs, joints)
 
     def make(session: Session) -> Results:
-        session.describe(scene)
-        checkpoint = session.opened(states.points(np.empty((0, len(states.names)))).units)
+        units = states.points(np.empty((0, len(states.names)))).units
+        checkpoint = session.opened(scene, units)
         where = states, ranks, checkpoint, options.style
         lives, even = follow(scene, *where), None
         if states.relief.size:  # the same lives, worn evenly, for comparison

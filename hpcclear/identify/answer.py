@@ -50,21 +50,20 @@ def run_identify(
         raise InputError("--limit", str(settings.limit), reason, "Give --date for each --signal")
     place = Place.of_file(output, options.fresh)
     key = {**run_key(scene, "identify"), **settings.key()}
-
-    def make(session: Session) -> Results:
-        session.describe(scene)
-        return session.write(_identified(scene, inputs, times, session, settings))
-
-    return Session(place, key, ranks, options).finished("identify", make)
+    session = Session(place, key, ranks, options)
+    return session.finished(
+        "identify", lambda here: _identified(scene, inputs, times, here, settings)
+    )
 
 
 def _identified(
     scene: Scene, inputs: Inputs, times: Array, session: Session, settings: Settings
 ) -> Results:
-    """What was found."""
+    """Find out, and write it."""
+    plain = scene
     if settings.pressure and settings.signals:
-        scene = loaded(scene, settings.signals[0], settings.pressure)
-    plain, seed = prepared_scene(scene), 0 if scene.study is None else scene.study.seed
+        plain = loaded(scene, settings.signals[0], settings.pressure)
+    plain, seed = prepared_scene(plain), 0 if scene.study is None else scene.study.seed
     response = simulated(plain.with_(SHORTEST), checked=False)
     frequency, sense = _driven(plain, response)
     usual = names_of(response) if settings.advise else ()
@@ -79,7 +78,7 @@ def _identified(
     layouts = [
         [Layout.of(one, sensor, _noise(one, settings.noise)) for one in row] for row in tables
     ]
-    kept, style = session.opened(), session.options.style
+    kept, style = session.opened(scene), session.options.style
     ensemble = ensemble_of(plain, inputs, every, size, seed, ranks, kept, style)
     with ranks.stage("posterior"):
         records = zip(tables, layouts, strict=True)
@@ -88,7 +87,8 @@ def _identified(
         if settings.advise:
             share = settings.noise or advising.NOISE
             gains = advising.advice(ensemble, every, sensor, frequency, share, seed)
-    return identified(ensemble, found, times, gains, settings, seed, session.attributes)
+    about = settings, seed, session.attributes
+    return session.write(identified(ensemble, found, times, gains, *about))
 
 
 def _driven(scene: Scene, response: Results) -> tuple[float, int]:

@@ -115,9 +115,8 @@ def run_study(
 def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     """Go on from what is there, to the end; what stages measured of time."""
     study, style = scene.required_study, session.options.style
-    session.describe(scene)
     units = {variable.name: variable.unit for variable in study.variables}
-    checkpoint = session.opened(units)
+    checkpoint = session.opened(scene, units)
     columns = tuple(variable.paths for variable in study.variables)
     points = expanded(study, Points(study.names, np.empty((0, len(columns))), columns))
     compile_ahead(scene, session.ranks, points, style)
