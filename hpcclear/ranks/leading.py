@@ -14,7 +14,6 @@ from hpcclear.ranks.schedule import (
     GLANCE,
     QUANTUM,
     HandOut,
-    Kept,
     Need,
     PointSource,
     Task,
@@ -59,6 +58,26 @@ def run_points(
             lead.work(task, spent)
             ranks.suspects = list
     return earlier[:0] if kept is None else kept.records()
+
+
+class Kept:
+    """Records of a design of `total` samples in their order, put where they belong as they come: held once, never sorted."""
+
+    def __init__(self, total: int, earlier: np.ndarray) -> None:
+        self._records = np.empty(total, earlier.dtype)
+        self._there = np.zeros(total, bool)
+        self.add(earlier)
+
+    def add(self, records: np.ndarray) -> None:
+        """Take finished records; raises TypeError for those of another type, whose fields NumPy would assign by their order."""
+        if records.dtype != self._records.dtype:
+            raise TypeError(f"records are of type {records.dtype}, not {self._records.dtype}")
+        self._records[records["sample"]] = records
+        self._there[records["sample"]] = True
+
+    def records(self) -> np.ndarray:
+        """What has been taken, by growing number, shape (taken,)."""
+        return self._records if self._there.all() else self._records[self._there]
 
 
 class Lead:
