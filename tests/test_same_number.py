@@ -1,6 +1,7 @@
 """A response and the sample of the same design are the same number, and what is printed of it says how sure it is."""
 
 import re
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.figures.labels import with_half_width
+from hpcclear.report.figures.labels import known_digits, quantities, with_half_width
 from hpcclear.scene import Scene, load_scene
 
 JOBS = Path(__file__).parents[1] / "jobs"
@@ -197,3 +198,20 @@ def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Pat
 def test_no_more_digits_than_the_half_width_supports(value: float, half_width: float, shown: str):
     unit = "N" if value > 1.0 else "m"
     assert with_half_width(value, half_width, unit) == shown
+
+
+def test_numbers_beside_each_other_have_the_digits_of_their_own_intervals():
+    rng = np.random.default_rng(8)
+    for value, share, other in zip(
+        10.0 ** rng.uniform(-7.0, 3.0, 300), 10.0 ** rng.uniform(-4.0, 0.5, 300), rng.uniform(0.2, 5.0, 300), strict=True,
+    ):  # fmt: skip
+        both = [(one, one * (1.0 - share), one * (1.0 + share)) for one in (value, value * other)]
+        digits = [known_digits(*one) for one in both]
+        shown = quantities([one[0] for one in both], "N", digits)
+        assert len({text.partition(" ")[2] for text in shown}) == 1
+        for text, (its, low, high) in zip(shown, both, strict=True):
+            number = Decimal(text.split()[0])
+            factor = {"kN": 1e3, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9}[text.split()[1]]
+            last = 10.0 ** number.normalize().as_tuple().exponent * factor  # type: ignore[operator]
+            assert last > 0.99 * 10.0 ** np.floor(np.log10((high - low) / 2.0) - 1.0)
+            assert abs(float(number) * factor - its) <= max((high - low) / 20.0, 5.1e-4 * its)

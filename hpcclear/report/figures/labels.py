@@ -129,14 +129,23 @@ def value(one: Variable) -> str:
     return quantity(number, str(one.attrs["units"]))
 
 
-def quantities(values: Sequence[float], units: str, digits: int = 4) -> list[str]:
+def quantities(values: Sequence[float], units: str, digits: int | Sequence[int] = 4) -> list[str]:
     """Numbers as `quantity` prints them, in one unit where they stand beside each other."""
-    texts = [quantity(one, units, digits) for one in values]
+    each = [digits] * len(values) if isinstance(digits, int) else digits
+    texts = [quantity(one, units, known) for one, known in zip(values, each, strict=True)]
     if len({text.partition(" ")[2] for text in texts if text != "–"}) < 2:
         return texts
-    chosen = scale(units, values)
-    shown = (f"{_shown(one * chosen.factor, digits)} {chosen.unit}" for one in values)
+    factor, unit = scale(units, values)
+    shown = (f"{_shown(x * factor, known)} {unit}" for x, known in zip(values, each, strict=True))
     return [text if np.isfinite(one) else "–" for text, one in zip(shown, values, strict=True)]
+
+
+def known_digits(value: float, low: float, high: float) -> int:
+    """Digits of a value that its confidence interval leaves: down to two of half its width, four at most."""
+    if not low < high or not value:
+        return 4
+    sizes = np.floor(np.log10([abs(value), (high - low) / 2.0]))
+    return int(np.clip(sizes[0] - sizes[1] + 2.0, 1.0, 4.0))
 
 
 def alike(*ones: Variable) -> list[str]:

@@ -137,7 +137,7 @@ def _goals(one: Results, names: Sequence[str]) -> list[object]:
         return []
     cells: list[object] = []
     for name in names:
-        value = labels.quantity(float(one[f"{name}_true"]), text_in(one, f"{name}_unit"))
+        value, _ = labels.stated(*labels.estimate(one, name), text_in(one, f"{name}_unit"))
         words = text_in(one, f"{name}_goal")
         cells.append(f"{words}: {value}" if words else "")
     return [*cells, "; ".join(map(str, constraints_of(one))) or "none"]

@@ -161,7 +161,9 @@ def _compared(
 ) -> Tile:
     """A value beside that of the baseline; both with the ends of their intervals."""
     moved, good = ("", None) if before is None else change(mine, before)
-    shown, *old = labels.quantities([mine[0], *(before or ())[:1]], unit)
+    both = [mine] if before is None else [mine, before]
+    digits = [labels.known_digits(*one) for one in both]
+    shown, *old = labels.quantities([one[0] for one in both], unit, digits)
     return Tile(label, shown, "".join(old).strip("–"), moved, apart, good)
 
 
