@@ -131,6 +131,20 @@ def test_the_first_screen_has_the_design_beside_todays_with_changes_and_interval
     assert not first.doubt
 
 
+@pytest.mark.parametrize(("share", "moved"), [(0.0, "\u221220 %"), (0.6, "")])
+def test_peaks_of_chaotic_runs_are_not_compared(share, moved):
+    """Each is one run: where a perturbation of its start changes it, a difference may be chance."""
+    forces = {"original": [800.0, 1000.0], "robust alpha": [800.0, 700.0]}
+    runs = {k: xr.Dataset({"peak_contact_force": ("joint", v)}) for k, v in forces.items()}
+    names = {"design": ["robust original", "robust alpha"]}
+    shares = dict.fromkeys(("chaotic", "chaos_share", "chaos_deviation"), ("design", [share, 0.0]))
+    chaos = xr.Dataset(shares, names)
+    files = {"verification": verified(MEAN, DEVIATION), "chaos": chaos}
+    tile = screen_of(Content(Path("out"), files, runs)).tiles[-1]
+    assert (tile.label, tile.value, tile.before) == ("peak force", "0.8 kN", "1 kN")
+    assert (tile.change, "chaotic" in tile.within) == (moved, bool(share))
+
+
 def test_red_comes_first_and_the_headline_is_in_doubt():
     first = opened(verified(MEAN, DEVIATION, beyond_hertz=np.array([0, 60, 0, 0, 0])))
     assert first.trust[0].level is Level.RED

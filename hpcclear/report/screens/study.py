@@ -184,14 +184,16 @@ def simulated(one: Results) -> list[list[str]]:
 
 
 def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
-    """The largest force of the stored responses: one run each, without an interval."""
+    """The largest force of the stored responses: one run each, without an interval, and of chaotic ones no change."""
     names = (text_in(best, "design"), "original" if base is not None else "")
     kept = [content.responses.get(name, Results({})) for name in names]
     known = [one.get("peak_contact_force") for one in kept]
     forces = [np.nan if one is None else float(np.nanmax(one.values)) for one in known]
     if np.isfinite(forces[0]):
         both = ((force, np.nan, np.nan) for force in forces)
-        yield _compared("peak force", "N", "one run", *both)
+        tile, moving = _compared("peak force", "N", "one run", *both), content.files.get("chaos")
+        chaotic = moving is not None and bool((moving["chaotic"].values > scatter.SOME).any())
+        yield tile._replace(change="", good=None, within="one chaotic run") if chaotic else tile
 
 
 def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
