@@ -193,7 +193,9 @@ def test_a_bifurcation_over_a_speed_is_simulated_written_found_again_and_drawn(t
     assert content["observed"].shape == (3, 2)
     speed = content["drive_speed"].values[1]
     changed = scene.with_({"drive.speed": speed, "numerics.averaged_revolutions": 2})
-    direct = motion.section(hpcclear.simulate(changed), "slider_position")[1:]
+    response = hpcclear.simulate(changed)
+    direct = motion.section(response, "slider_position")[1:]
+    assert int(content["flags"][1]) == int(response["flags"]) > 0
     np.testing.assert_allclose(content["observed"][1], direct, rtol=1e-12)
     xr.testing.assert_identical(run_bifurcation(*words).content.to_xarray(), content)
     assert found.content["observed"].attrs["units"] == "m"

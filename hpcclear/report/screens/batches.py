@@ -90,16 +90,16 @@ def _trust(found: Results) -> Iterator[Trust]:
         yield amber("The designs were chosen, not drawn: no intervals", "quality")
 
 
-def _flagged(shares: Mapping[Flag, float], outside: str) -> Iterator[Trust]:
+def _flagged(shares: Mapping[Flag, float], outside: str, what: str = "samples") -> Iterator[Trust]:
     """What flags say, by the share of samples that have each; `outside`: of the contact model's range, in words."""
     for flag, text in (
         (Flag.BEYOND_HERTZ, f"contact model outside its range, {outside}"),
         (Flag.LATCHED, "a joint never left contact, f may depend on the integration tolerance"),
         (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
     ):
-        if share := shares[flag]:
+        if share := shares.get(flag):
             level = red if share > MOST and flag is not Flag.LATCHED else amber
-            yield level(f"{spread.percent(share)} of the samples: {text}", "quality")
+            yield level(f"{spread.percent(share)} of the {what}: {text}", "quality")
 
 
 def map_of_motion(found: Results, content: Content) -> Screen:
@@ -132,10 +132,8 @@ def map_of_motion(found: Results, content: Content) -> Screen:
     if open_ := sum(n for regime, n in kinds if regime in moving):
         text = f"{counted(open_, 'cell')} not settled: longer transients would decide"
         trust.append(amber(text, "quality"))
-    if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
-        level = red if share > MOST else amber
-        text = f"contact model outside its range, {bearings.outside(found)}"
-        trust.append(level(f"{spread.percent(share)} of the cells: {text}", "quality"))
+    share = _share(found, Flag.BEYOND_HERTZ)
+    trust += _flagged({Flag.BEYOND_HERTZ: share}, bearings.outside(found), "cells")
     rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
     return Screen(
         headline, (f"{cells} over {axes}", f"f: {labels.objective(found)}"),
@@ -156,9 +154,14 @@ def bifurcation(found: Results, content: Content) -> Screen:
         ends = float(np.nanmin(seen.values)), float(np.nanmax(seen.values))
         headline = f"{what}: {labels.between(*ends, unit)}"
     level = amber if failed else green
-    trust = level(f"{count - failed} of {count} values without failure", "reproduce")
-    about = f"{count} values, {crossings} revolutions each"
-    return Screen(headline, (about,), trust=(trust,), figures=("bifurcation",))
+    trust = [level(f"{count - failed} of {count} values without failure", "reproduce")]
+    share = _share(found, Flag.BEYOND_HERTZ)
+    trust += _flagged({Flag.BEYOND_HERTZ: share}, bearings.outside(found), "values")
+    return Screen(
+        headline, (f"{count} values, {crossings} revolutions each",),
+        "the contact model is outside its range" if share > MOST else "",
+        trust=trusted(trust, share > MOST), figures=("bifurcation",),
+    )  # fmt: skip
 
 
 def statistics(found: Results, content: Content) -> Screen:

@@ -1,7 +1,8 @@
 """One value for each revolution, against an entry of the scene."""
 
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.results.rows import ResultKind, count, number
+from hpcclear.base.outcome import Flag
+from hpcclear.results.rows import ResultKind, count, flag, number
 
 KIND = ResultKind(
     30, "One value for each revolution, against an entry of the scene", ("value", "crossing"),
@@ -10,5 +11,6 @@ KIND = ResultKind(
         "value": count("value", "number of the value"),
         "crossing": count("crossing", "number of the revolution, the first after the transient"),
         "observed": number("value crossing", "objective", MEAN_GAP.words, required=True),
+        "flags": flag("value", "validity warnings of the result", Flag),
     },
 )
