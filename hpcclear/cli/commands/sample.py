@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from hpcclear.base.errors import InputError
 from hpcclear.cli import loaded, options as cli
 
 
@@ -51,8 +50,9 @@ def run(
         simulating = ("thresholds", "statistics", "raw", "part", *cli.How._fields)
         cli.check_mode("--merge", True, simulating)
         return _merge(written, output, points) if cli.is_root() else None
+    cli.check_mode("--statistics", statistics, ("points", "thresholds", "part"), ("raw",))
+    cli.check_mode("--part", part is not None, ("fresh",))
     with cli.on_ranks(how.time_limit) as ranks:
-        _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         scene = loaded(written)
         from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.session import run_sample
@@ -81,22 +81,3 @@ def _merge(written: cli.Written, output: Path, points: Path | None) -> None:
     from hpcclear.ranks.boundary import alone
 
     describe_run(run_merge(scene, design(scene, points), output, alone()), "samples")
-
-
-def _check_kind(
-    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool,
-    thresholds: tuple[str, ...],
-) -> None:  # fmt: skip
-    """Raise InputError where options name two kinds of sampling at once."""
-    if part is not None and (statistics or fresh):
-        reason = "a part of a job array writes its samples for a later merge"
-        raise InputError("--part", part, reason, "Drop --statistics and --fresh")
-    if statistics and points is not None:
-        reason = "--statistics generates the study's Monte Carlo points itself"
-        raise InputError("--points", str(points), reason, "Drop one of the two")
-    if thresholds and statistics:
-        reason = "--statistics keeps a histogram and no samples"
-        raise InputError("--beyond", ", ".join(thresholds), reason, "Drop one of the two")
-    if raw is not None and not statistics:
-        reason = "without --statistics the samples are written anyway"
-        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
