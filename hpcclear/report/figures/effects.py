@@ -76,10 +76,9 @@ def shown(value: float, limit: float) -> str:
     if not np.isfinite(value):
         return "-"
     value, limit = 100.0 * value, 100.0 * limit
-    digits = int(np.clip(1 - np.floor(np.log10(max(limit, 1e-2))), 0, 2))
-    number = f"{value:+.{digits}f}"
-    number = number[1:] if float(number) == 0.0 else number
-    return f"{number} ± {limit:.{digits}f} %"
+    digits = int(min(1 - np.floor(np.log10(max(limit, 1e-2))), 2))  # negative: of tens
+    number, half = (f"{round(one, digits):+.{max(digits, 0)}f}" for one in (value, limit))
+    return f"{number[float(number) == 0.0 :]} ± {half[1:]} %"
 
 
 def undecided(content: Results, variant: int) -> str:

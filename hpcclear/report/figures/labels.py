@@ -183,11 +183,13 @@ def paired(value: float, half_width: float) -> str:
     def places(number: float, digits: int) -> int:
         return digits - 1 - int(np.floor(np.log10(number))) if number > 0.0 else digits
 
-    least = places(abs(value), _MOST_DIGITS)
-    decimals = max(min(places(half_width, 2), least) if half_width > 0.0 else least, 0)
+    decimals = max(places(abs(value), _MOST_DIGITS), 0)
+    if half_width > 0.0:
+        decimals = min(places(half_width, 2), decimals)  # negative: tens are rounded, too
     step = 10.0**-decimals
     rounded = abs(np.ceil(half_width / step - 1e-9)) * step  # up: it is no narrower than it is
-    return f"{value:.{decimals}f} ± {rounded:.{decimals}f}"
+    near, shown = round(value, decimals) + 0.0, max(decimals, 0)  # 0 has no sign
+    return f"{near:.{shown}f} ± {rounded:.{shown}f}"
 
 
 def between(low: float, high: float, units: str) -> str:
