@@ -22,8 +22,9 @@ from hpcclear.report import alike
 from hpcclear.report.answer import answer
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.page import write_report
-from hpcclear.report.screen import Level, Screen, Trust
+from hpcclear.report.screen import Level, Screen, Trust, change
 from hpcclear.report.screens import screen_of
+from hpcclear.report.spread import Line
 from hpcclear.results import dataset
 from hpcclear.study import run_study
 
@@ -178,6 +179,21 @@ def test_the_terminal_has_24_lines_of_80_columns(capsys):
     heads = next(line for line in lines if "today" in line).split("  ")
     shown = [one.strip() for one in heads if one]
     assert shown[-2:] == ["change", "95 %, note"]  # a note may be long
+
+
+def test_a_change_has_the_sign_and_the_size_that_its_values_have():
+    known, zero, none = (1.0, 0.99, 1.01), (0.0, 0.0, 0.014), (np.nan, np.nan)
+    assert change((0.996, 0.9959, 0.9961), (1.0, 0.9999, 1.0001)) == ("−0.4 %", True)
+    assert change((-0.05, *none), (-0.14, *none)) == ("+64 %", False)  # of a formula such as -m3
+    assert change((0.14, *none), (0.14, *none)) == ("no significant change", None)
+    assert change(zero, (0.002, 0.0, 0.01)) == ("no significant change", None)
+    assert change(zero, known) == ("−100 %", True)
+
+
+def test_a_label_of_any_length_stands_apart_from_its_text(capsys):
+    lines = [Line(label, "37.5 % of the samples") for label in ("f > 3 N", "f > 8 km/s²")]
+    describe(Content(Path("out"), {"verification": verified(MEAN, DEVIATION)}), asked=lines)
+    assert capsys.readouterr().out.count(" 37.5 %") == 2
 
 
 def test_a_table_that_is_too_wide_for_its_words_is_turned(capsys):

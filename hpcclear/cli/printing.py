@@ -114,8 +114,8 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
 
 
 def _labelled(label: str, text: str) -> Iterator[Text]:
-    for k, line in enumerate(_wrapped(fitting(text), 8) if text else []):
-        yield Text(f"{'' if k else label:8}{line}")
+    first = f"{label:6}  {fitting(text)}"  # a label may be longer
+    yield from map(Text, textwrap.wrap(first, WIDTH, subsequent_indent=" " * 8) if text else [])
 
 
 def _wrapped(text: str, margin: int = 0) -> list[str]:

@@ -165,14 +165,13 @@ def change(after: Sequence[float], before: Sequence[float]) -> tuple[str, bool |
     (new, *ends), (old, *old_ends) = after, before
     if not (np.isfinite([new, old]).all() and old):
         return "", None
-    ratio = new / old
-    known = np.isfinite([*ends, *old_ends]).all() and new
-    halves = [float(np.ptp(one)) / 2.0 for one in (ends, old_ends)] if known else [np.nan] * 2
-    reach = abs(ratio) * float(np.hypot(halves[0] / new, halves[1] / old)) if known else np.nan
-    moved = ratio - 1.0
-    if np.isfinite(reach) and abs(moved) <= reach:
+    moved = (new - old) / abs(old)  # upwards where it grows, of negative values, too
+    halves = [float(np.ptp(one)) / 2.0 for one in (ends, old_ends)]  # NaN where not known
+    reach = np.hypot(halves[0], new / old * halves[1]) / abs(old)
+    if abs(moved) <= reach or abs(moved) < 1e-4:
         return "no significant change", None
-    return f"{100.0 * moved:+.0f} %".replace("-", "\N{MINUS SIGN}"), moved < 0.0
+    share = f"{100.0 * moved:+.{'0f' if abs(moved) > 0.0095 else '1g'}} %"
+    return share.replace("-", "\N{MINUS SIGN}"), moved < 0.0
 
 
 def upper(text: str) -> str:
