@@ -16,8 +16,7 @@ from hpcclear.ensemble.session import samples_of
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
-from hpcclear.scene.named import SHORT_NAMES
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points, check_points, entries_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,13 +45,9 @@ def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
 
     Raises InputError if it is not one of these.
     """
-    if scene.study is not None and name in scene.study.names:
-        return scene.study.variable(name).paths
-    if name in SHORT_NAMES:
-        known = set(scene.numeric_paths())
-        return tuple(path for path in SHORT_NAMES[name] if path in known)
-    scene.number(name)  # refuses what is no number of this scene
-    return (name,)
+    if not (found := entries_of(scene, name)):
+        scene.number(name)  # refuses what is no number of this scene
+    return found
 
 
 def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Dataset:

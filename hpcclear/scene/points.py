@@ -305,10 +305,7 @@ def _read(sheet: "Sheet", column: "SheetColumn", paths: Sequence[str]) -> Array:
 
 def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tuple[str, ...]:
     """Entries that a column such as ``C [mm]`` drives, none if it names the rows."""
-    numbers = scene.numeric_paths()
-    of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
-    named = {**SHORT_NAMES, **of_study}
-    paths = tuple(path for path in named.get(column.name, (column.name,)) if path in numbers)
+    paths = entries_of(scene, column.name)
     if not paths:
         of_scene = any(column.name.startswith(f"{table}.") for table in Scene.model_fields)
         if column.name.lower() in LABELS or (sheet.is_text(column) and not of_scene):
@@ -317,5 +314,15 @@ def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tu
             remedy = 'Write a name, and its unit as in "C [mm]"'
             raise InputError(key, column.heading, "is not a column name", remedy)
         reason = "is neither a variable nor a number of this scene"
-        raise InputError(key, column.name, reason, nearest(column.name, (*named, *numbers)))
+        names = (*SHORT_NAMES, *(() if scene.study is None else scene.study.names))
+        known = [name for name in dict.fromkeys(names) if entries_of(scene, name)]
+        remedy = nearest(column.name, (*known, *scene.numeric_paths()))
+        raise InputError(key, column.name, reason, remedy)
     return paths
+
+
+def entries_of(scene: Scene, name: str) -> tuple[str, ...]:
+    """Scene entries that a name drives: the study's, a short name's, or a path itself; none where the scene lacks them."""
+    of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
+    known = scene.numeric_paths()
+    return tuple(path for path in {**SHORT_NAMES, **of_study}.get(name, (name,)) if path in known)
