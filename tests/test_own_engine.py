@@ -132,6 +132,12 @@ def test_what_is_meant_is_not_warned_of(job):
 RIGID = ("joints.crank_rod.kind=ideal", "joints.rod_slider.kind=ideal")
 
 
+def test_a_study_of_what_is_0_is_warned_of():
+    study = "effects.friction=none", "study.variables.m2.range=[0.1, 0.4]"
+    (text,) = implausible(load_scene(JOBS / "slider_crank.toml", [*RIGID, *study]))
+    assert text.startswith('study.objective = "mean-gap" is 0 where all joints are ideal')
+
+
 @pytest.mark.parametrize("more", [(), RIGID], ids=["with play", "without"])
 def test_a_response_holds_the_load_that_was_applied(more):
     """Through every row of the table, between the rows, and its work is the work that the balance knows."""

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.base.outcome import MAX_BANDS, WIDEST
+from hpcclear.base.outcome import IMPACTS, MAX_BANDS, WIDEST
 from hpcclear.scene.fields import Entries, check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.named import SHORT_NAMES
@@ -172,8 +172,9 @@ class ConsistentTables(SceneTables):
     def _check_levels(self) -> None:
         bands = self.bands()
         key = "numerics.levels" if self.numerics.levels else self.objective_key
-        if bands and not self.clearance_joints():
-            raise invalid("force levels need a joint with clearance", "Remove it", key)
+        if (bands or self._asks_any(IMPACTS)) and not self.clearance_joints():
+            reason = "force levels and impacts are those of joints with clearance"
+            raise invalid(reason, 'Remove it, or set a joint\'s kind = "clearance"', key)
         if bands and self.numerics.target_error is not None:
             reason = "force levels are those of a given number of revolutions"
             raise invalid(reason, "Remove numerics.target_error, and set averaged_revolutions", key)

@@ -48,6 +48,9 @@ def implausible(scene: SceneTables) -> Iterator[str]:
                 yield f"{path} = {scene.shown(path)} is {what}; {remedy.format(number)}"
     yield from _bodies(scene)
     yield from _joints(scene)
+    if scene.study is not None and scene.objective.of_joints and not scene.clearance_joints():
+        remedy = 'name one of the motion, or set a joint\'s kind = "clearance"'
+        yield f'study.objective = "{scene.objective.name}" is 0 where all joints are ideal; {remedy}'
     loops = scene.template is None or scene.numerics.formulation == "baumgarte"
     if loops and scene.numerics.beta == 0.0:
         yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
