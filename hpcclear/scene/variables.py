@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import PrivateAttr
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import at
+from hpcclear.base.errors import at, nearest
 from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, CatalogueRow, Cost
 from hpcclear.scene.fields import Bounds, Content, Entries, Number, Numbers, Quantity, invalid
@@ -96,6 +96,10 @@ class StudyVariable(NamedInput):
         """The row with its paths, and numbers in the unit of these."""
         row, paths = with_paths(cls._without_numbers(row))
         kinds = [key for key in _KINDS if key in row]
+        fields = tuple(cls.model_fields)
+        for key in () if kinds else row:  # what is missing may be misspelt
+            if key not in fields:
+                raise invalid("is not a known key", nearest(key, fields), key)
         if len(kinds) != 1:
             raise invalid(
                 "a variable needs a range or values, fits, a catalogue or, for an inertia, a ratio",
