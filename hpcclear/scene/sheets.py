@@ -20,6 +20,7 @@ from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.remarks import remark
 from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import NOTHING, SheetColumn, Stored, columns_of, decimal_of
+from hpcclear.scene.fields import LARGEST
 from hpcclear.scene.workbook import cells_of
 
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
@@ -67,7 +68,7 @@ class Sheet:
             number = None
         reason, remedy = "is not a finite decimal number", "Write a number such as 0.21"
         try:
-            if number is not None:
+            if number is not None and abs(number) <= LARGEST:
                 return units.scaled(number, size)
             if not column.unit and self._has_unit(text):
                 pointed = text.replace(",", ".") if comma else text
@@ -76,6 +77,8 @@ class Sheet:
                 reason, remedy = f"the cell is empty: it {reason}", "Give each column a value"
             elif text.startswith("#"):
                 reason, remedy = "is an error of the spreadsheet", "Mend its formula"
+            elif number is not None:
+                reason, remedy = f"is beyond {LARGEST:g}", "Check its digits and its exponent"
             elif clock.is_clock(text):
                 reason = "is a date or time: spreadsheet programs make dates of numbers such as 1.3"
                 remedy = "Format the cell as a number and write it again"
@@ -117,7 +120,7 @@ class Sheet:
         if not self.comma and all(map(_PLAIN.issuperset, column.cells)):
             try:
                 values = np.array(column.cells, dtype=float)
-                if np.isfinite(values).all():
+                if (np.abs(values) <= LARGEST).all():
                     exact = (units.scaled(one, size) for one in values.tolist())
                     return values if size == 1 else np.array(list(exact))
             except ValueError:  # said below, with its place
