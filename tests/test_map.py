@@ -99,7 +99,8 @@ def test_axes_take_names_paths_and_units():
 @pytest.mark.parametrize(
     "axes",
     [("C=1",), ("C=1e-4:1e-3:0",), ("C=a:b:3",), ("nothing=1:2:3",), ("C=1e-4:nan:3",), ("C=1e-4:30 rpm:3",),
-     ("C=1e-4:1e-3:3", "joints.crank_rod.clearance=1e-4:1e-3:3"), ("C=0:1:3",), ("C=1mm:1e-4:3",), ("m3=1:1:1",)],
+     ("C=1e-4:1e-3:3", "joints.crank_rod.clearance=1e-4:1e-3:3"), ("C=0:1:3",), ("C=1mm:1e-4:3",), ("m3=1:1:1",),
+     ("C=0.1mm:1mm:1000000", "m3=0.1:0.2:1000000")],
     ids=lambda axes: " ".join(axes),
 )  # fmt: skip
 def test_what_is_no_grid_is_refused(axes):

@@ -31,10 +31,10 @@ def axis(scene: Scene, words: str, option: str = "--x") -> tuple[str, tuple[str,
 
     Raises InputError at the option if the words do not say that.
     """
-    found = re.fullmatch(r"([^=]+)=([^:]+):([^:]+):\s*(0*[1-9]\d{0,8})\s*", words)
+    found = re.fullmatch(r"([^=]+)=([^:]+):([^:]+):\s*(0*[1-9]\d{0,3})\s*", words)
     if found is None:
         example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
-        raise InputError(option, words, "is not PATH=LO:HI:N", example)
+        raise InputError(option, words, "is not PATH=LO:HI:N with N up to 9999", example)
     name, *ends, count = found.groups()
     paths = paths_of(scene, name)
     bounds = range_of(option, words, ends, scene.unit(paths[0]))

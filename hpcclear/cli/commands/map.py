@@ -28,7 +28,9 @@ from hpcclear.cli import loaded, options as cli
 @cli.option(
     "--transient", "Revolutions before the first one that is observed.", 60, type=click.IntRange(0)
 )
-@cli.option("--revolutions", "Revolutions that are observed.", 60, type=click.IntRange(min=1))
+@cli.option(
+    "--revolutions", "Revolutions that are observed.", 60, type=click.IntRange(1, 1_000_000)
+)
 @cli.with_how
 def run(
     written: cli.Written,
