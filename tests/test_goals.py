@@ -64,6 +64,11 @@ def test_words_tables_and_units_of_the_objective() -> None:
         "probability of f above 0.0004 m",
     ]
     assert [one.most for one in case.kept] == [0.4, 5e-4, 0.01]
+    levels = {0.91: "91st", 0.12: "12th", 0.5012: "50.12th", 0.99999999: "99.999999th"}
+    for level, place in levels.items():
+        goal = with_case(objectives=[{"statistic": "quantile", "level": level}])
+        (known,) = goal.required_study.case("robust").goals
+        assert known.words("m") == f"{place} percentile of f"
     assert load_scene(scene.resolved()) == scene
     assert load_scene(QUICKSTART).required_study.case("robust").plain
     goals = ["mean", {"statistic": "exceedance", "limit": "2 kN"}]

@@ -114,7 +114,10 @@ class Goal(Table):
             return self.formula
         what, unit = self._response(unit)
         if self.statistic == "quantile":
-            return f"{100 * self.order:g}th percentile of {what}"
+            number = f"{100 * self.order:.12g}"  # 0.9999999 is not the 100th
+            place = "" if "." in number or number[:-1] == "1" else number[-1]
+            end = {"1": "st", "2": "nd", "3": "rd"}.get(place, "th")
+            return f"{number}{end} percentile of {what}"
         if self.statistic == "exceedance":
             return f"probability of {what} above {shown(self.limit or 0.0, unit)}"
         if self.statistic == "deviation":
