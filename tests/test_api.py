@@ -42,6 +42,8 @@ def test_evaluate_refuses_what_makes_no_mechanism():
         hpcclear.evaluate(scene, {})
     with pytest.raises(InputError, match="not a number of this scene"):
         hpcclear.evaluate(scene, {"drive.spead": 1.0})
+    with pytest.raises(InputError, match=r"'C, C12': two columns drive joints\.crank_rod"):
+        hpcclear.evaluate(scene, {"C": [3e-4], "C12": [5e-4]})
     pins = (f"joints.{name}.kind=ideal" for name in ("crank_rod", "rod_slider"))
     ideal = hpcclear.load_scene(SCENE, [*pins, "effects.friction=none"])
     with pytest.raises(InputError, match=r"'C'.*not a number of this scene"):

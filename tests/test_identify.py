@@ -134,7 +134,7 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
     ):
         with pytest.raises(InputError, match=reason):
             Inputs.of(scene, [words])
-    with pytest.raises(InputError, match="two drive the same entry"):
+    with pytest.raises(InputError, match="two unknowns drive joints"):
         Inputs.of(scene, [UNKNOWN, UNKNOWN])
     with pytest.raises(InputError, match="no harmonic"):
         Layout.of(Measured("a", Spectrum(np.zeros(9), np.zeros(9), 5), True, SPEED, 9), Sensor((0.0, 40.0)))  # fmt: skip

@@ -16,7 +16,7 @@ from hpcclear.ensemble.session import samples_of
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points, check_points, entries_of
+from hpcclear.scene.points import Points, check_apart, check_points, entries_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,13 +29,14 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     """
     if isinstance(points, Points):
         return points
-    if not points:
-        reason = "no entry is varied"
-        raise InputError("points", {}, reason, "Give at least one name and its values")
-    names = tuple(map(str, points))
-    columns = (np.atleast_1d(np.asarray(values, float)) for values in points.values())
+    given = dict(points)  # of tables of pandas the columns
+    if not given:
+        raise InputError("points", {}, "no entry is varied", "Give a name and its values")
+    names = tuple(map(str, given))
+    columns = (np.atleast_1d(np.asarray(values, float)) for values in given.values())
     values = np.column_stack(np.broadcast_arrays(*columns))
     made = Points(names, values, tuple(paths_of(scene, name) for name in names))
+    check_apart("points", "columns", names, made.paths)
     check_points(scene, made)
     return made
 

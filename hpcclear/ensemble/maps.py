@@ -20,7 +20,7 @@ from hpcclear.results.grids import SHAPE
 from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points, check_apart, check_points
 
 if TYPE_CHECKING:
     from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
@@ -74,14 +74,11 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
 
     Raises InputError if an axis is not one, two are the same, or a cell makes no mechanism.
     """
-    parsed = [axis(scene, *one) for one in zip(axes, ("--x", "--y"), strict=False)]
-    names = tuple(name for name, _, _ in parsed)
-    driven = [entry for _, paths, _ in parsed for entry in paths]
-    if len(set(driven)) < len(driven):
-        raise InputError("--y", axes[1], "two axes drive the same entry", "Drop one")
-    grid = np.meshgrid(*(values for _, _, values in parsed), indexing="ij")
-    values = np.column_stack([one.ravel() for one in grid])
-    points = Points(names, values, tuple(paths for _, paths, _ in parsed))
+    parsed = (axis(scene, *one) for one in zip(axes, ("--x", "--y"), strict=False))
+    names, paths, along = zip(*parsed, strict=True)
+    check_apart("--y", "axes", axes, paths)
+    grid = np.meshgrid(*along, indexing="ij")
+    points = Points(names, np.column_stack([one.ravel() for one in grid]), paths)
     check_points(scene, points)
     if not scene.clearance_joints():
         remedy = 'Set a joint\'s kind = "clearance"'

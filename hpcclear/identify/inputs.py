@@ -12,7 +12,7 @@ from hpcclear.ensemble.maps import range_of
 from hpcclear.identify.signals import Sensor
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points, check_apart, check_points
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import offsets
 
@@ -66,9 +66,7 @@ class Inputs:
             raise InputError("--unknown", "", "nothing is to be identified", remedy)
         own = tuple(Unknown.of(scene, words) for words in unknowns)
         taken = [path for one in own for path in one.paths]
-        if len(set(taken)) < len(taken):
-            listed = ", ".join(unknowns)
-            raise InputError("--unknown", listed, "two drive the same entry", "Drop one")
+        check_apart("--unknown", "unknowns", unknowns, (one.paths for one in own))
         rows = () if scene.study is None else scene.study.random
         made = cls(scene, own, tuple(row for row in rows if not set(row.paths) & set(taken)))
         plain = scene.with_({"study": None})

@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -281,9 +281,7 @@ def read_points(path: str | Path, scene: Scene) -> Points:
         reason = "no column has numbers of this scene"
         raise InputError(key, ", ".join(sheet.names), reason, "Name one such as m2 [g]")
     names, paths = tuple(c.name for c in columns), tuple(paths for _, paths in driven if paths)
-    twice = [path for path, count in Counter(itertools.chain(*paths)).items() if count > 1]
-    if twice:
-        raise InputError(key, ", ".join(names), f"two columns drive {twice[0]}", "Remove one")
+    check_apart(key, "columns", names, paths)
     values = np.column_stack(list(map(_read, itertools.repeat(sheet), columns, paths)))
     named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
     points = Points(names, values, paths, named if labels else ())
@@ -319,6 +317,13 @@ def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tu
         remedy = nearest(column.name, (*known, *scene.numeric_paths()))
         raise InputError(key, column.name, reason, remedy)
     return paths
+
+
+def check_apart(key: str, what: str, names: Sequence[str], paths: Iterable[Sequence[str]]) -> None:
+    """Raise InputError at `key` where two of what has these names drive the same entry of a scene."""
+    twice = [path for path, count in Counter(itertools.chain(*paths)).items() if count > 1]
+    if twice:
+        raise InputError(key, ", ".join(names), f"two {what} drive {twice[0]}", "Remove one")
 
 
 def entries_of(scene: Scene, name: str) -> tuple[str, ...]:
