@@ -111,7 +111,9 @@ def analyse(run: Run) -> Variables:
     spin_up = int(np.median([_spin_up(gaps) for gaps in kept]))
     kept = [gaps[spin_up:] for gaps in kept]
     means = [objective(gaps.mean(axis=0)) for gaps in kept]  # (copies,) each
-    mean, square = (np.array([*map(function, means)]) for function in (np.mean, _square_error))
+    mean = np.array([np.mean(one) for one in means])
+    errors = (np.var(one, ddof=1) / len(one) if len(one) > 2 else np.nan for one in means)
+    square = np.array([*errors])
     truth, pool = _truth(mean, square)
     share = np.zeros(len(mean))
     share[pool:] = 1.0 / (len(mean) - pool)
@@ -169,11 +171,6 @@ def _spin_up(gaps: Array) -> int:
     y = judging.projected(gaps)
     parted = min(judging.parted(y.var(axis=1, ddof=1)), len(y) // 2)
     return max(judging.spin_up(y.mean(axis=1)), parted, 1)
-
-
-def _square_error(values: Array) -> float:
-    """Of the mean of independent values (n,)."""
-    return float(np.var(values, ddof=1) / len(values)) if len(values) > 2 else np.nan
 
 
 def _truth(mean: Array, square: Array) -> tuple[float, int]:

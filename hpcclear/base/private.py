@@ -103,12 +103,10 @@ def _exchangeable(about: os.stat_result) -> bool:
 def _trusted_users() -> set[int]:
     """Numbers of the user and of root, who in a container without a root of its own shows up as the overflow user."""
     trusted = {0, host.user_number() or 0}
-    try:
+    with contextlib.suppress(OSError, ValueError):
         maps = [line.split() for line in Path("/proc/self/uid_map").read_text().splitlines()]
         if not any(int(inside) == 0 for inside, _, _ in maps):
             trusted.add(int(Path("/proc/sys/kernel/overflowuid").read_text()))
-    except (OSError, ValueError):
-        pass
     return trusted
 
 

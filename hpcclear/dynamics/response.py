@@ -283,9 +283,8 @@ class Collected(Heard):
     def finish(self, record: Records) -> Found:
         """Return what it comes to, with the outcome (1,)."""
         self.end()
-        data, shown = {}, self._shown(record)
-        for name in list(self._parts[0]):
-            data[name] = np.concatenate([part.pop(name) for part in self._parts])[shown]
+        shown, parts = self._shown(record), self._parts
+        data = {key: np.concatenate([one.pop(key) for one in parts])[shown] for key in [*parts[0]]}
         data["energy_residual"] -= self._began
         problem = self.sample.problem
         if Status(int(record["status"][0])).valid and problem.effects.joints:

@@ -36,10 +36,8 @@ def launched_size(environment: Mapping[str, str] = os.environ) -> tuple[str, int
 def launched_rank(environment: Mapping[str, str] = os.environ) -> int | None:
     """Rank that the launcher gave to this process, known before MPI starts; None without one."""
     names = _RANK if launched_size(environment)[0] != "SLURM_STEP_NUM_TASKS" else ("SLURM_PROCID",)
-    for name in names:
-        if environment.get(name, "").isdigit():
-            return int(environment[name])
-    return None
+    values = (environment.get(name, "") for name in names)
+    return next((int(one) for one in values if one.isdigit()), None)
 
 
 def is_launched(environment: Mapping[str, str] = os.environ) -> bool:

@@ -62,17 +62,14 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
         if (day is None, zoned) != (first[0] is None, first[3]):
             reason = "is a time of another kind than those above it"
             raise InputError(where(row), cell, reason, "Write date, time and zone in one way")
-        if day is None and last[1] - whole > (period := _period(found)) / 2:
+        # minutes and seconds without an hour begin again with the hour
+        period = 3600 if found and found["minutes"] and not found["hours"] else DAY
+        if day is None and last[1] - whole > period / 2:
             gone += period
         days = (day or 0) - (first[0] or 0)
         made.append(DAY * days + gone + whole - first[1] + (fraction - first[2]))
         last = now
     return made
-
-
-def _period(found: re.Match[str] | None) -> int:
-    """When such a time begins again: a day, or an hour of minutes and seconds."""
-    return 3600 if found is not None and found["minutes"] and not found["hours"] else DAY
 
 
 def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> Moment:

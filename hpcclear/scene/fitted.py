@@ -48,7 +48,10 @@ def with_shares(content: Tables) -> Tables:
                 content = replace(content, f"study.random.{name}.relative", True)
                 note_share(str(share), unit, "the value that each design has")
                 continue
-            middle = row["mean"] if "mean" in row else _number(content, path)
+            owner, _, leaf = path.rpartition(".")
+            middle = row.get("mean")
+            if "mean" not in row:  # that of the file, a clearance by its fit, too
+                middle = with_clearance(table_at(content, owner)).get(leaf)
             if middle is None:
                 raise invalid(f"no number stands at {path}", "Give that entry first", where, share)
             with at(where, share):
@@ -69,12 +72,6 @@ def note_share(share: str, unit: str, about: str) -> None:
     if not unit:
         instead = "for a width of that many hundredths write a plain number"
         note(share, f"{share.strip()} of {about}; {instead}")
-
-
-def _number(content: Tables, path: str) -> object:
-    """What a file has at a path, a clearance by its fit, too."""
-    owner, _, leaf = path.rpartition(".")
-    return with_clearance(table_at(content, owner)).get(leaf)
 
 
 def entry_replaced(content: Tables, path: str, value: object) -> Content:

@@ -279,9 +279,7 @@ def write(
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)
     used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]
-    data: dict[str, np.ndarray] = {}
-    for name in used:
-        data[name] = np.array([choice.design.get(name, np.nan) for choice in choices])
+    data = {name: np.array([one.design.get(name, np.nan) for one in choices]) for name in used}
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]

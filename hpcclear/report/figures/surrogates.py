@@ -237,9 +237,7 @@ def symbol(name: str) -> str:
         return f"{symbol(name.removesuffix('_ratio'))} ratio"
     if len(name) == 2 and name[1].isdigit():
         return labels.noted(name, f"${name[0]}_{name[1]}$")
-    if name == "C":
-        return labels.noted(name, "$C$")
-    return labels.entry(name)
+    return labels.noted(name, "$C$") if name == "C" else labels.entry(name)
 
 
 def _finish_grid(axes: np.ndarray, used: int, across: str, up: str) -> None:

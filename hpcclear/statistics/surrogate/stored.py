@@ -68,10 +68,9 @@ def models_in(columns: Mapping[str, ArrayLike]) -> dict[str, Piecewise]:
     Raises InputError: the rows are no models, or do not fit together.
     """
     arrays = {name: np.asarray(one) for name, one in columns.items()}
-    found: dict[str, list[int]] = {}
-    for row, family in enumerate(arrays["family"]):
-        found.setdefault(str(family), []).append(row)
-    return {family: _family(arrays, family, rows) for family, rows in found.items()}
+    of = arrays["family"].astype(str)
+    rows = {family: np.flatnonzero(of == family).tolist() for family in dict.fromkeys(of.tolist())}
+    return {family: _family(arrays, family, own) for family, own in rows.items()}
 
 
 def _family(arrays: Mapping[str, np.ndarray], family: str, rows: list[int]) -> Piecewise:
