@@ -213,7 +213,7 @@ def kinds() -> list[Kind]:
          curve(one, compressed, ("Kurbelwinkel [°KW]", "Zylinderdruck [bar]"), separator=";", comma=True, encoding="cp1252"),
          compressed),
         ("no headings", "g", curve(one, compressed).split(b"\n", 1)[1], compressed),
-        ("two turns in a scene of one", "h", curve(two, indicated), "longer than one turn"),
+        ("two turns in a scene of one", "h", curve(two, indicated), "has two turns"),
         ("half a turn", "i", curve(one[:37], compressed), "leaves out 180 to 360 deg"),
         ("half a turn in three rows", "i3", curve(one[:37:18], compressed), "leaves out 180 to 360 deg"),
         ("pressures below 0", "u", curve(one, lambda a: -compressed(a)), "no absolute pressure is below 0"),

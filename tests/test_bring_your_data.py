@@ -138,6 +138,32 @@ def test_two_turns_of_a_four_stroke_engine(tmp_path):
         with_file(base, key, wrong)
 
 
+@pytest.mark.parametrize(
+    ("turns", "angle_of", "own", "expected"),
+    [
+        (4, {}, 2, 4),
+        (2, {"angle_of": "rod"}, 1, 1),  # it repeats with each turn of this body
+        (3, {}, 2, "has two turns, and the entry repeats after 3 turns"),
+        (0, {}, 1, "must be from 1 to 64"),
+        (10**9, {}, 1, "must be from 1 to 64"),
+    ],
+)
+def test_a_file_is_repeated_until_its_entry_repeats(turns, angle_of, own, expected, tmp_path):
+    content = load_scene(LINKAGE).resolved()
+    content["mechanism"]["drives"]["motor"]["turns"] = turns
+    path = pressure_file(tmp_path, np.arange(0.0, 360.0 * own), kinds_of_tables.indicated)
+    size = {"file": str(path), "bore": "80 mm", "ambient": "1 bar"}
+    content["mechanism"]["loads"]["gas"] |= {"size": size, **angle_of}
+    if isinstance(expected, str):
+        with pytest.raises(InputError, match=expected):
+            load_scene(content)
+    else:
+        rows = next(one.size for one in load_scene(content).mechanism.loads if one.name == "gas")
+        angles, forces = np.array(rows).T
+        np.testing.assert_allclose(np.diff(angles), np.radians(1.0), rtol=1e-9)
+        np.testing.assert_array_equal(np.resize(forces[: 360 * own], 360 * expected), forces)
+
+
 def test_a_torque_and_a_motion_from_files(tmp_path):
     (tmp_path / "t.csv").write_text(
         "phi;M\ndeg;Nm\n"

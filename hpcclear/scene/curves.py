@@ -87,7 +87,7 @@ def by_time(unit: str, value: str = "value", fewest: int = 2) -> Pairs:
     return Pairs("s", unit, ("time", value), fewest=fewest, most=LONGEST_CURVE, least=0.0)
 
 
-_LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a four-stroke engine"
+LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a four-stroke engine"
 
 
 def check_period(pairs: Rows, turns: int, key: str) -> None:
@@ -95,7 +95,7 @@ def check_period(pairs: Rows, turns: int, key: str) -> None:
     span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
     length = "one turn" if turns == 1 else f"{turns} turns"
     if span > turn * (1 + 1e-12):
-        remedy = f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}"
+        remedy = f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {LONGER}"
         raise invalid(f"the table is longer than {length}", remedy, key)
     if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
         reason = f"the curve repeats every {length}, but its last value differs from its first"

@@ -11,7 +11,9 @@ from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
 from hpcclear.scene.fields import Angle, Count, Quantity, Table, invalid
 
-Turns = Annotated[int, Count(least=1, most=64)]
+MOST_TURNS = 64
+"""Of a drive in a revolution."""
+Turns = Annotated[int, Count(least=1, most=MOST_TURNS)]
 Interval = Annotated[float, Quantity("s", above=0)]
 
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
@@ -14,7 +14,9 @@ from hpcclear.base.errors import InputError, at
 from hpcclear.base.plain import counted
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.base.written import Reading
+from hpcclear.scene.curves import LONGER
 from hpcclear.scene.delimited import SheetColumn, parsed_heading
+from hpcclear.scene.driving import MOST_TURNS
 from hpcclear.scene.faults import explained
 from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, Tables, invalid, table_at
 from hpcclear.scene.paths import curve_at, curves, files_named, replace
@@ -26,7 +28,7 @@ SEAM = 0.02
 LARGEST_GAP = math.radians(20)
 """Angle that may be left out of a revolution, where steps are smaller."""
 FINEST = math.radians(0.1)
-"""Step to which longer tables are resampled."""
+"""Step to which longer tables are resampled, or a wider one that makes them short enough."""
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
 _MOTIONS = {"angle": "rad", "speed": "rad/s"}
 _KINDS = {unit: kind for kind, unit in (_VALUES | _MOTIONS).items()}
@@ -92,7 +94,7 @@ Read = tuple[list[list[float]], str]
 def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1) -> Read:
     """The pairs of a curve against the crank angle, rad and `unit` (N or N*m), rising, and what was read in words.
 
-    `key`: the entry that it stands for; `turns`: of a revolution of the scene, a file of one turn is repeated as often.
+    `key`: the entry that it stands for; `turns`: after which that repeats, a file of fewer is repeated until then.
     Raises InputError if the file is no such curve; it says what was found.
     """
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
@@ -107,9 +109,16 @@ def pairs_of(curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
         angles = -angles
     where = f"{key}.file", str(folder / curve.file)
     angles, values = _revolution(angles, values, where)
-    if angles[-1] - angles[0] < TURN:
-        angles = np.concatenate([angles + k * TURN for k in range(turns)])
-        values = np.tile(values, turns)
+    own = 1 if angles[-1] - angles[0] < TURN else 2
+    if turns % own:
+        reason = f"has two turns, and the entry repeats after {counted(turns, 'turn')}"
+        raise InputError(*where, reason, f"Give one turn. {LONGER}")
+    if len(angles) * turns // own > (most := LONGEST_CURVE - 1):
+        count = min(round(TURN / FINEST), most // turns) * own
+        fine = angles[0] + own * TURN / count * np.arange(count)
+        angles, values = fine, np.interp(fine, angles, values, period=own * TURN)
+    angles = np.concatenate([angles + k * TURN for k in range(0, turns, own)])
+    values = np.tile(values, turns // own)
     return [[float(a), float(v)] for a, v in zip(angles + curve.zero, values, strict=True)], shown
 
 
@@ -218,10 +227,6 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
             raise InputError(*where, reason, "Give a curve that repeats, or leave the last row out")
         values = np.append((values[0] + values[-1]) / 2, values[1:-1])
         angles = angles[:-1]
-    if len(angles) > LONGEST_CURVE - 1:
-        fine = angles[0] + FINEST * np.arange(round(turns * TURN / FINEST))
-        wide = np.append(angles, angles[0] + turns * TURN)
-        angles, values = fine, np.interp(fine, wide, np.append(values, values[0]))
     return angles, values
 
 
@@ -277,11 +282,14 @@ def _curve(content: Tables, row: Tables, key: str, folder: Path) -> Read:
             raise invalid(f"has no meaning here, where a {own} is read", "Remove it", entry)
     if pairs.x == "s":
         return against_time(curve, folder, pairs.unit, key)
-    return pairs_of(curve, folder, pairs.unit, key, _turns(content))
+    return pairs_of(curve, folder, pairs.unit, key, _turns(content, key))
 
 
-def _turns(content: Tables) -> int:
-    """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
-    rows = [content.get("drive"), *table_at(content, "mechanism.drives").values()]
-    turns = [row.get("turns", 1) for row in rows if isinstance(row, Mapping)]
-    return max((one for one in turns if type(one) is int), default=1)
+def _turns(content: Tables, key: str) -> int:
+    """Turns after which a curve against the angle repeats, by a parsed scene that is not validated yet."""
+    if "angle_of" in table_at(content, key.rpartition(".")[0]):
+        return 1
+    rows = table_at(content, "mechanism.drives")
+    drives = [table_at(rows, str(name)) for name in rows] or [table_at(content, "drive")]
+    turns = next((row for row in drives if row.get("period") is True), drives[0]).get("turns", 1)
+    return turns if type(turns) is int and 1 <= turns <= MOST_TURNS else 1

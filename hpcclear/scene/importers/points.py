@@ -10,6 +10,7 @@ import tomli_w
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import written
+from hpcclear.scene.driving import MOST_TURNS
 from hpcclear.scene.fields import Content
 from hpcclear.scene.importers.file import GROUND, limit, listed
 
@@ -17,8 +18,6 @@ MASS = 0.1
 """kg of a body whose mass nobody has given."""
 SPEED = 60.0
 """rpm of a drive whose speed nobody has given."""
-MOST_TURNS = 64
-"""Of a drive in a revolution."""
 FARTHEST = 1e5
 """m from the origin."""
 
