@@ -82,6 +82,9 @@ BROKEN = {
         "already",
     ),
     "two periods": (with_more("drives", DEAD), "drives.swing", " s': does not repeat"),
+    "turns of a drive that gives no period": (
+        with_more("drives", constant_speed("wheel", "rocker", 80.0, turns=2)), "drives.wheel.turns", "'motor' defines",
+    ),
     "no inertia": (
         with_body("rocker", inertia=0.0, center=(0.0, 0.0)),  # that of its pin
         "bodies.rocker.inertia",

@@ -334,16 +334,19 @@ def _one_period(m: Mechanism) -> None:
         remedy = "Leave period = true with one drive"
         raise InputError(f"drives.{named[1].name}.period", True, reason, remedy)
     main = m.period
-    for drive in m.drives:
+    for drive in [one for one in m.drives if one is not main]:
         if drive.prescribed and not main.prescribed:
             reason = f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period"
             raise InputError(f"drives.{drive.name}.period", False, reason, "Set period = true here")
-        if drive is not main and drive.kind == "table" and drive.advance:
+        if drive.kind == "table" and drive.advance:
             reason = "goes round by full turns, but another drive defines the period"
             remedy = "End it at the angle where it began, or set period = true here"
             gained = f"{drive.advance:.4g} rad"
             raise InputError(f"drives.{drive.name}.angle", gained, reason, remedy)
-        if drive is main or not drive.prescribed:
+        if drive.turns != 1:
+            reason, remedy = f"{main.name!r} defines the revolution", "Remove it, or write it there"
+            raise InputError(f"drives.{drive.name}.turns", drive.turns, reason, remedy)
+        if not drive.prescribed:
             continue
         times = main.seconds / drive.seconds
         if abs(times - round(times)) > 1e-9 * times or round(times) < 1:
