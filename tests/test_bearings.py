@@ -32,6 +32,7 @@ def test_the_peak_has_the_angle_at_which_it_occurs(instants):
     brief = {"numerics.transient_revolutions": 1, "numerics.averaged_revolutions": 2}
     scene = load_scene("jobs/slider_crank.toml").with_(brief)
     whole = simulate(scene.with_({"output.instants_per_revolution": 0}))
+    assert bearings.outside(whole).endswith(", Hertz' limit is 73.87 µm")  # c/4 R_J/R_B
     inside = bearings.averaged(whole)
     stored = whole["contact_force"].to_numpy()[inside].argmax(axis=0)
     angles = whole["crank_angle"].to_numpy()[inside][stored] % TURN

@@ -12,6 +12,7 @@ from test_loads import machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.dynamics.setup.parameters import joint_numbers
+from hpcclear.report.bearings import outside
 from hpcclear.scene.points import Numbers
 
 JOB = Path(__file__).parents[1] / "jobs" / "loose_slot.toml"
@@ -50,6 +51,7 @@ def test_a_pin_slides_or_rolls_down_its_slot(coefficient):
     depth = (MASS * GRAVITY * math.cos(tilt) / stiffness_of(still)) ** (2 / 3)
     friction = {"law": "coulomb", "coefficient": coefficient, "ramp_speed": 1e-4}
     found = simulate(roller(tilt, -CLEARANCE - depth, friction))
+    assert outside(found).endswith(" in slot.right, Hertz' limit is 2.5 mm")
     time, arm = found["time"].to_numpy(), RADIUS - depth / 2
     assert (coefficient > math.tan(tilt) / (1 + MASS * arm**2 / INERTIA)) == (coefficient > 0.1)
     if coefficient > 0.1:

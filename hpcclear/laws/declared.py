@@ -180,7 +180,7 @@ class ContactLaw(Law):
     damping: Function | None = None
     """Factor of the rate (`latched`: of the rate over the impact speed), s/m or 1; by default by differences."""
     deepest: Function | None = None
-    """Depth beyond which a result is flagged, m; by default where theories of small contacts end (`parameters.HERTZ_RANGE`)."""
+    """Depth beyond which a result is flagged, m; by default where theories of small contacts end (`Shape.deepest`)."""
     without_loss: str = ""
     """Name of the law that is left without damping."""
     lossless: Function | None = None

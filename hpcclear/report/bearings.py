@@ -11,6 +11,7 @@ from hpcclear.base.outcome import Flag
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import scene_of
 from hpcclear.results.content import Results, texts_in
+from hpcclear.scene.points import Numbers
 
 ROUNDING = 1e-12
 """Of the largest torque: a smaller mean is zero but for rounding."""
@@ -75,14 +76,17 @@ def outside(result: Results) -> str:
     """Return what puts the contact model outside its range: the depth, of a response how deep, and the limit of Hertz theory;
     "" of a contact with a limit of its own (`hpcclear.laws.declared.Geometry.deepest`)."""
     scene = scene_of(result)
-    law = scene and scene.effects.contact
-    if not law or law.declared.deepest is not None:
+    if scene is None or not (law := scene.effects.contact) or law.declared.deepest is not None:
         return ""
     if "penetration" not in result:
         return "indentation above 25 % of clearance, Hertz' limit"
     deepest = np.nanmax(result["penetration"].values[averaged(result)], axis=0)
-    share = np.nanmax(deepest / motion.clearances(result))
-    return f"indentation {100.0 * share:.0f} % of the clearance, Hertz' limit is 25 %"
+    get = Numbers(scene, None)
+    limits = {one: scene.shape(one, get).deepest.item() for one in scene.contact_labels()}
+    depths = dict(zip(limits, deepest[list(scene.open_places)].tolist(), strict=True))
+    worst = max(limits, key=lambda name: depths[name] / limits[name])
+    depth, limit = (labels.quantity(one[worst], "m") for one in (depths, limits))
+    return f"indentation {depth} at stored instants in {worst}, Hertz' limit is {limit}"
 
 
 def torque(response: Results) -> Torque:

@@ -17,7 +17,7 @@ from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.about import About, inputs_of
 from hpcclear.scene.choices import input_entry
-from hpcclear.scene.contacts.declared import AlongLine
+from hpcclear.scene.contacts.declared import AlongLine, Get, Shape
 from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
 from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import Content, NamedRows, Table, nearest
@@ -254,6 +254,11 @@ class SceneTables(Table):
     def clearance_joint(self, label: str) -> Any:
         """The table of a joint with clearance, or of a contact's joint."""
         return self._loose[label.partition(".")[0]]
+
+    def shape(self, label: str, get: Get) -> Shape:
+        """Numbers of a contact's shape; `get`: those of an entry of the scene, by its path."""
+        key, joint = self.joint_key(label), self.clearance_joint(label)
+        return cast(Shape, joint.shape(lambda name: get(f"{key}.{name}")))
 
     @property
     def slider_crank(self) -> SliderCrank:

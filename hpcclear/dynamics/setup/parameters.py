@@ -18,15 +18,7 @@ from hpcclear.laws.constant import with_constants
 from hpcclear.laws.declared import JOINT
 from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.scene import Scene
-from hpcclear.scene.contacts.declared import Shape
 from hpcclear.scene.points import Numbers, Points
-
-HERTZ_RANGE = 0.25
-"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
-
-Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
-the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
-"""
 
 OF_RAMP, OF_FORCE = 0.5, 0.003
 """Of friction's ramp, and of the forces of inertia: what errors of explicit steps at the edge of stability may come to."""
@@ -49,17 +41,11 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     return with_further_numbers(scene, get, p) if further_rows(scene) else p
 
 
-def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
-    """Numbers of a contact's shape."""
-    key, joint = scene.joint_key(label), scene.clearance_joint(label)
-    return joint.shape(lambda name: get(f"{key}.{name}"))
-
-
 def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
     """Numbers of a contact's samples by the names of `declared.JOINT`, (m,)."""
     key = scene.joint_key(label)
     materials = scene.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}.materials")
-    shape = shape_of(scene, get, label)
+    shape = scene.shape(label, get)
     clearance, bearing, journal = shape.radii
     moduli, ratios = (
         [get(f"{materials}.{part}.{entry}") for part in ("bearing", "journal")]
@@ -88,7 +74,7 @@ def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None
 
     `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
     """
-    joint, shape = joint_numbers(scene, get, label), shape_of(scene, get, label)
+    joint, shape = joint_numbers(scene, get, label), scene.shape(label, get)
     p[:, at.CLEARANCE] = shape.clearance
     p[:, at.BEARING_RADIUS] = shape.bearing_radius
     p[:, at.JOURNAL_RADIUS] = shape.journal_radius
@@ -98,13 +84,11 @@ def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None
     rows = numbers.rows_of(law, found, len(p))
     p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
     p[:, at.EXPONENT], p[:, at.DAMPING] = numbers.shape_near(law, force, found)
-    if law.deepest is None:
-        ratio = joint["journal_radius"] / joint["bearing_radius"]
-        p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
-    else:
-        p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
-    if not scene.clearance_joint(label).round:  # a corner is small
-        p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
+    p[:, at.DEEPEST_VALID] = shape.deepest
+    if law.deepest is not None:
+        own = numbers.evaluate(law.deepest, found)
+        small = not scene.clearance_joint(label).round  # a corner
+        p[:, at.DEEPEST_VALID] = np.minimum(own, shape.deepest) if small else own
     rubs = scene.effects.friction
     if rubs.law == "none":
         return

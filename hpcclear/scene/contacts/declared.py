@@ -32,6 +32,16 @@ class Shape:
     radii: tuple[Array, Array, Array]
     radius: Array
 
+    @property
+    def deepest(self) -> Array:
+        """Depth beyond which a result is flagged, m, unless the law says otherwise.
+
+        Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds
+        half the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
+        """
+        clearance, bearing, journal = self.radii
+        return 0.25 * (journal / bearing) * clearance
+
 
 class ContactGeometry(Table):
     """A joint that may have clearance; each geometry of contact is a file beside this one.
