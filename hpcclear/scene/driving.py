@@ -217,6 +217,9 @@ class CrankTorque(Table):
         self.check_one_of(remedy, "torque", "torque_by_speed")
         if self.torque_by_speed is not None and self.no_load_speed is not None:
             raise invalid("torque_by_speed says how the torque falls", "Remove it", "no_load_speed")
+        if self.no_load_speed is not None and isinstance(self.torque, float) and self.torque < 0.0:
+            remedy = "Clockwise write torque_by_speed = [[speed, torque], ...], speeds below 0"
+            raise invalid("is of a torque above 0: this one would grow", remedy, "no_load_speed")
 
 
 class PlanarTorque(FreeDriving, CrankTorque):
