@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from commands import overrides, run
 from linkages import FOUR, bar, constant_speed, harmonic, pins, torque_drive
-from planar_scenes import planar_scene
+from planar_scenes import planar_scene, without_play
 from test_linkage_scenes import ROCKER, rocker
 
 from hpcclear import load_scene, simulate
@@ -18,6 +18,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.planar.problem import refused_of
 from hpcclear.dynamics.planar.turning import changes, passage, refused
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
@@ -217,6 +218,12 @@ def test_check_names_where_the_design_locks(tmp_path):
     code, told = run(["check", str(study), *overrides(LOCKED), "--no-cost"], 0)
     assert code == 1
     assert said in " ".join(told.split())
+
+
+@pytest.mark.parametrize("ask", [refused_of, simulate])
+def test_what_cannot_be_put_together_is_refused_by_its_key_in_the_scene(ask):
+    with pytest.raises(InputError, match=r"^mechanism\.joints\."):
+        ask(without_play(rocker("mechanism.bodies.coupler.length=1")))
 
 
 def test_a_linkage_without_a_drive_is_refused():

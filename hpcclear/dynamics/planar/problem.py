@@ -211,7 +211,8 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
 
 @lru_cache(maxsize=2)
 def _walk_of(scene: Scene) -> Walk | None:
-    return passage(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
+    with errors.at("mechanism"):
+        return passage(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
 
 
 @lru_cache(maxsize=64)
