@@ -53,7 +53,9 @@ def contributions(inputs: Array, f: Array, groups: Sequence[int]) -> Contributio
     Failed simulations are NaN in f; inputs of one number in `groups` (d of them) vary together.
     """
     size, good = inputs.shape[2], np.isfinite(f)
-    terms = _terms(size)
+    # inputs of each term, and its power where it has one input
+    terms: list[Term] = [((k,), power) for k in range(size) for power in range(1, DEGREE + 1)]
+    terms += [(pair, 1) for pair in combinations(range(size), 2)]
     if len(f) < 2 or good.sum() < FEWEST * (len(terms) + 1):
         return _always(np.nan, size)
     middle, scale = inputs[good].mean(axis=0), inputs[good].std(axis=0)
@@ -88,12 +90,6 @@ def _always(value: float, size: int) -> Contributions:
 
 
 Term = tuple[tuple[int, ...], int]
-
-
-def _terms(size: int) -> list[Term]:
-    """Inputs of each term, and its power where it has one input."""
-    single = [((k,), power) for k in range(size) for power in range(1, DEGREE + 1)]
-    return [*single, *((pair, 1) for pair in combinations(range(size), 2))]
 
 
 def _moments(x: Array, f: Array, terms: Sequence[Term]) -> Array:
