@@ -48,16 +48,6 @@ def before_row(lane, W, work, c):
 
 
 @lane_event
-def stop_at_rows(rules, lane, W, work):
-    """Shorten the step to the first row beyond which it goes."""
-    first = 2.0
-    for c in range(rules.curves):
-        first = min(first, before_row(lane, W, work, c))
-    if first < 1.0:
-        cut(lane, W, work, first)
-
-
-@lane_event
 def row_of(lane, W, par, tables, c, k):
     """Where row k of table c stands: a share of its length, or what the sample's parameters say."""
     row = tables[(int(tables[curves.HEAD * c + curves.BREAKS]) + k) & curves.PLACES]
@@ -92,17 +82,17 @@ def row_at(lane, W, par, tables, c, k):
 
 
 @lane_event
-def next_rows(lane, W, work, par, tables, c):
-    """The rows around the end of this step: of one that it ends at, beyond it.
+def next_rows(lane, W, work, par, tables, c, rates):
+    """The rows around the end of this step, or around its beginning, by its `rates`: of one that stands there, beyond it.
 
     The first row of a table that repeats is at 0, so that no place between two rows is a length off.
     """
     count = int(tables[curves.HEAD * c + curves.BREAK_COUNT])
     ahead, behind = FAR, -FAR
     if count > 0:
-        place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
+        place = work[(rates + at.PLACES + c) * W + lane]
         reach = row_reach(work, c, lane, W)
-        onward = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + lane] >= 0.0
+        onward = work[(rates + at.PLACE_RATES + c) * W + lane] >= 0.0
         place += reach if onward else -reach
         k = row_before(lane, W, par, tables, c, place)
         if tables[curves.HEAD * c + curves.REPEATS] == 1.0 and place >= 1.0:
@@ -117,3 +107,16 @@ def next_rows(lane, W, work, par, tables, c):
                 ahead = behind + part
     work[(at.NEXT_ROW + c) * W + lane] = ahead
     work[(at.LAST_ROW + c) * W + lane] = behind
+
+
+@lane_event
+def stop_at_rows(rules, lane, W, work, par, tables):
+    """Shorten the step to the first row beyond which it goes."""
+    first = 2.0
+    for c in range(rules.curves):
+        ahead, behind = work[(at.NEXT_ROW + c) * W + lane], work[(at.LAST_ROW + c) * W + lane]
+        if ahead == behind:  # before the first step
+            next_rows(lane, W, work, par, tables, c, at.RATE_OLD)
+        first = min(first, before_row(lane, W, work, c))
+    if first < 1.0:
+        cut(lane, W, work, first)

@@ -26,7 +26,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
     status = failure(lane, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + lane] == 1.0:
         if rules.curves > 0:  # first: contacts are latched at the ends of steps that stay
-            stop_at_rows(rules, lane, W, work)
+            stop_at_rows(rules, lane, W, work, block.par, tables)
         if rules.latched and work[at.ACCEPT * W + lane] == 1.0:
             stops.stop_at_impacts(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0:
@@ -37,7 +37,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
             for p in range(rules.begin, rules.end):
                 stops.integrate_gap(lane, W, work, p)
             for c in range(rules.curves):
-                next_rows(lane, W, work, block.par, tables, c)
+                next_rows(lane, W, work, block.par, tables, c, at.RATE_NOW)
     return status
 
 
