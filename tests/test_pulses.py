@@ -152,9 +152,10 @@ def test_a_pulse_over_the_time_gives_a_wheel_its_momentum(interpolation):
         rows = [[begin, 0.0], [begin + width / 2, -4.0 / width], [begin + width, 0.0]]
         rows = [[0.0, 0.0], *rows] if begin else rows
         rows += [[length, 0.0]] if begin + width < length else []
-        text = {"kind": "torque", "body": "wheel", "torque_by_time": rows}
-        scene = wheel(text, interpolation=interpolation, revolutions=3 if begin < 1 else 105)
-        found = simulate(scene)
+        load = {"kind": "torque", "body": "wheel", "torque_by_time": rows}
+        scene = wheel(load, interpolation, 3 if begin < 1 else 105)
+        by = "minimal" if begin < 1 else "baumgarte"  # the axes of the pin are apart
+        found = simulate(scene.with_({"numerics.formulation": by}))
         speed = found["crank_speed"].to_numpy()
         assert speed[-1] - speed[0] == pytest.approx(-2.0 / 1e-2, rel=1e-5)  # area over inertia
 

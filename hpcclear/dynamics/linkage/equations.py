@@ -184,7 +184,7 @@ class MotionEquations:
         return coupled(moving, factored, found) if moving else found
 
     def _passed(self, block: list[int]) -> dict[int, list[int]]:
-        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin.
+        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin in the block.
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """
@@ -192,8 +192,9 @@ class MotionEquations:
             return {}
         numbers = {row.name: r for r, row in enumerate(self.constraints, len(self.columns))}
         pins = [one.name for one in self.forest.closures if is_pin(one)]
-        pairs = [[numbers[f"{name}_{axis}"] for axis in "xy"] for name in pins]
-        return {r: both for both in pairs for r in both if r in block}
+        pairs = [{numbers[f"{name}_{axis}"] for axis in "xy"} for name in pins]
+        both = [sorted(pair.intersection(block)) for pair in pairs]
+        return {r: one for one in both for r in one}
 
     def reaction(self, column: Mover, found: dict[int, Term]) -> Term:
         """What has to act along a column that is prescribed."""
