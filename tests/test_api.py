@@ -34,6 +34,22 @@ def test_evaluate_takes_paper_names_and_paths():
     np.testing.assert_array_equal(result["drive_speed"], 500.0)
 
 
+@pytest.mark.parametrize(
+    ("column", "reason"),
+    [
+        (["140 g"], "'140 g'"),
+        ([0.1, 0.2, 0.3], "mismatch"),
+        (np.ma.array([0.1, 0.2], mask=[0, 1]), "finite"),
+    ],
+)
+def test_columns_that_are_no_designs_are_refused(column, reason):
+    """Texts, columns of several lengths, and masked values, which arrays keep apart from the numbers."""
+    scene = hpcclear.load_scene(SCENE, SHORT[1])
+    assert scene.numerics.averaged_revolutions == 1  # one override needs no list
+    with pytest.raises(InputError, match=reason):
+        hpcclear.evaluate(scene, {"C": [1e-4, 2e-4], "m3": column})
+
+
 def test_evaluate_refuses_what_makes_no_mechanism():
     scene = hpcclear.load_scene(SCENE, SHORT)
     with pytest.raises(InputError, match=r"sample 1.*clearance as large"):

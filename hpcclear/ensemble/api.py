@@ -33,8 +33,14 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     if not given:
         raise InputError("points", {}, "no entry is varied", "Give a name and its values")
     names = tuple(map(str, given))
-    columns = (np.atleast_1d(np.asarray(values, float)) for values in given.values())
-    values = np.column_stack(np.broadcast_arrays(*columns))
+    try:
+        columns: list[ArrayLike] = [
+            np.ma.filled(np.ma.asarray(x, float), np.nan) for x in given.values()
+        ]
+        values = np.column_stack(np.broadcast_arrays(*map(np.atleast_1d, columns)))
+    except ValueError as error:
+        remedy = "Give numbers in SI, one or as many as the others have, for each name"
+        raise InputError("points", list(given), str(error).removesuffix("."), remedy) from None
     made = Points(names, values, tuple(paths_of(scene, name) for name in names))
     check_apart("points", "columns", names, made.paths)
     check_points(scene, made)

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, WithJsonSchema, model_validator
@@ -289,8 +290,8 @@ class Count(Converted):
     def convert(self, value: object) -> int:
         """The value; an error for validators where it is none."""
         remedy = f"Write a whole number from {self.least} to {self.most}"
-        if isinstance(value, float) and value.is_integer():
-            value = int(value)
+        if isinstance(value, Integral) or (isinstance(value, float) and value.is_integer()):
+            value = value if isinstance(value, bool) else int(value)  # those of NumPy, too
         if isinstance(value, bool) or not isinstance(value, int):
             raise invalid("a whole number is expected here", remedy)
         if not self.least <= value <= self.most:

@@ -38,7 +38,7 @@ def load_scene(
     ----------
     source : path or mapping
         A TOML file, or its parsed content.
-    overrides : sequence of str
+    overrides : str or sequence of str
         ``"key.path=value"`` entries that replace what the file says; the value is read as TOML if
         it can be, else as a string, so ``joints.crank_rod.clearance=0.5 mm`` needs no quotes.
     trust : bool
@@ -56,6 +56,7 @@ def load_scene(
     else:
         text = file_text(Path(source), "scene file", "Give the path of a TOML scene file")
         content = parse(text, str(source))
+    overrides = [overrides] if isinstance(overrides, str) else overrides
     for key, value in overriding(overrides):
         content = entry_replaced(content, key, value)
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
