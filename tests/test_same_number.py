@@ -22,6 +22,8 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures.labels import known_digits, quantities, with_half_width
+from hpcclear.report.screens.lives import spread
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene, load_scene
 
 JOBS = Path(__file__).parents[1] / "jobs"
@@ -216,3 +218,20 @@ def test_numbers_beside_each_other_have_the_digits_of_their_own_intervals():
             last = 10.0 ** number.normalize().as_tuple().exponent * factor  # type: ignore[operator]
             assert last > 0.99 * 10.0 ** np.floor(np.log10((high - low) / 2.0) - 1.0)
             assert abs(float(number) * factor - its) <= max((high - low) / 20.0, 5.1e-4 * its)
+
+
+def test_a_life_has_the_digits_of_its_interval():
+    """Of 60 lives from 1.0 to 2.0 million revolutions the median is known to a tenth, of equal ones to all four digits."""
+    for spread_out, shown in (1e6, "1 500 000"), (0.0, "1 002 000"):
+        lives = 1.0021e6 + np.linspace(0.0, spread_out, 60)
+        table = xr.Dataset(
+            {
+                "lifetime": ("life", lives),
+                "lifetime_quantile": ("quantile", np.quantile(lives, [0.05, 0.5, 0.95])),
+            },
+            {"quantile": [0.05, 0.5, 0.95]},
+        )
+        assert (
+            spread(Results.of(table), "lifetime", 3e6)[0][0].replace("\N{NO-BREAK SPACE}", " ")
+            == shown
+        )

@@ -142,7 +142,7 @@ def quantities(values: Sequence[float], units: str, digits: int | Sequence[int] 
 
 def known_digits(value: float, low: float, high: float) -> int:
     """Digits of a value that its confidence interval leaves: down to two of half its width, four at most."""
-    if not low < high or not value:
+    if not (low < high and abs(value) > 0.0):
         return 4
     sizes = np.floor(np.log10([abs(value), (high - low) / 2.0]))
     return int(np.clip(sizes[0] - sizes[1] + 2.0, 1.0, 4.0))
