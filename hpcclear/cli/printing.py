@@ -114,7 +114,7 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
 
 
 def _labelled(label: str, text: str) -> Iterator[Text]:
-    first = f"{label:6}  {fitting(text)}"  # a label may be longer
+    first = f"{label:7} {fitting(text)}"  # a label may be longer
     yield from map(Text, textwrap.wrap(first, WIDTH, subsequent_indent=" " * 8) if text else [])
 
 
