@@ -21,7 +21,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.session import Options, run_sample
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.figures.labels import known_digits, quantities, with_half_width
+from hpcclear.report.figures.labels import scale, stated, with_half_width
 from hpcclear.report.screens.lives import spread
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene, load_scene
@@ -209,8 +209,8 @@ def test_numbers_beside_each_other_have_the_digits_of_their_own_intervals():
         10.0 ** rng.uniform(-7.0, 3.0, 300), 10.0 ** rng.uniform(-4.0, 0.5, 300), rng.uniform(0.2, 5.0, 300), strict=True,
     ):  # fmt: skip
         both = [(one, one * (1.0 - share), one * (1.0 + share)) for one in (value, value * other)]
-        digits = [known_digits(*one) for one in both]
-        shown = quantities([one[0] for one in both], "N", digits)
+        chosen = scale("N", [one[0] for one in both])
+        shown = [stated(*one, "N", chosen)[0] for one in both]
         assert len({text.partition(" ")[2] for text in shown}) == 1
         for text, (its, low, high) in zip(shown, both, strict=True):
             number = Decimal(text.split()[0])

@@ -290,13 +290,11 @@ class Count(Converted):
     def convert(self, value: object) -> int:
         """The value; an error for validators where it is none."""
         remedy = f"Write a whole number from {self.least} to {self.most}"
-        if isinstance(value, Integral) or (isinstance(value, float) and value.is_integer()):
-            value = value if isinstance(value, bool) else int(value)  # those of NumPy, too
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise invalid("a whole number is expected here", remedy)
-        if not self.least <= value <= self.most:
+        if isinstance(value, bool) or not isinstance(value, Integral | float) or value % 1:
+            raise invalid("a whole number is expected here", remedy)  # NaN and inf are none
+        if not self.least <= (count := int(value)) <= self.most:
             raise invalid(f"must be from {self.least} to {self.most}", remedy)
-        return value
+        return count
 
     def json_schema(self) -> JsonSchemaValue:
         """A whole number within the bounds."""

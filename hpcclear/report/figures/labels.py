@@ -129,23 +129,14 @@ def value(one: Variable) -> str:
     return quantity(number, str(one.attrs["units"]))
 
 
-def quantities(values: Sequence[float], units: str, digits: int | Sequence[int] = 4) -> list[str]:
+def quantities(values: Sequence[float], units: str, digits: int = 4) -> list[str]:
     """Numbers as `quantity` prints them, in one unit where they stand beside each other."""
-    each = [digits] * len(values) if isinstance(digits, int) else digits
-    texts = [quantity(one, units, known) for one, known in zip(values, each, strict=True)]
+    texts = [quantity(one, units, digits) for one in values]
     if len({text.partition(" ")[2] for text in texts if text != "–"}) < 2:
         return texts
     factor, unit = scale(units, values)
-    shown = (f"{_shown(x * factor, known)} {unit}" for x, known in zip(values, each, strict=True))
+    shown = (f"{_shown(one * factor, digits)} {unit}" for one in values)
     return [text if np.isfinite(one) else "–" for text, one in zip(shown, values, strict=True)]
-
-
-def known_digits(value: float, low: float, high: float) -> int:
-    """Digits of a value that its confidence interval leaves: down to two of half its width, four at most."""
-    if not (low < high and abs(value) > 0.0):
-        return 4
-    sizes = np.floor(np.log10([abs(value), (high - low) / 2.0]))
-    return int(np.clip(sizes[0] - sizes[1] + 2.0, 1.0, 4.0))
 
 
 def alike(*ones: Variable) -> list[str]:
@@ -202,12 +193,14 @@ def between(low: float, high: float, units: str) -> str:
     return ends[1] if ends[0] == ends[1] else f"{ends[0].removesuffix(unit)} to {ends[1]}"
 
 
-def stated(value: float, low: float, high: float, units: str) -> tuple[str, str]:
+def stated(
+    value: float, low: float, high: float, units: str, chosen: Scale | None = None
+) -> tuple[str, str]:
     """Return a value and its confidence interval in words, in one unit, to two digits of half its width, outwards, and four of
-    all."""
+    all; `chosen`: the unit of all that stand beside each other."""
     if not np.isfinite(value):
         return "–", "–"
-    chosen, digits = scale(units, (value, low, high)), 4
+    chosen, digits = chosen or scale(units, (value, low, high)), 4
     numbers = np.array([value, low, high]) * chosen.factor
     if low < high:
         sizes = np.log10([(numbers[2] - numbers[1]) / 2.0, abs(numbers).max()])

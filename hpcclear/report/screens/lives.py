@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.report.figures.labels import between, known_digits, quantity
+from hpcclear.report.figures.labels import between, quantity, stated
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
@@ -93,9 +93,9 @@ def _limit(lives: Results) -> str:
     return "a limit"
 
 
-def _long(count: float, digits: int = 4) -> str:
-    """Digits of a number of revolutions or hours, without an exponent, in groups of three."""
-    short = float(f"{count:.{digits}g}")
+def _long(count: float) -> str:
+    """Four digits of a number of revolutions or hours, without an exponent, in groups of three."""
+    short = float(f"{count:.4g}")
     return f"{short:.4g}" if short < 1e4 else f"{short:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
 
 
@@ -182,17 +182,17 @@ def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str
     every = lives[name].values
     known = every[~np.isnan(every)]
 
-    def one(value: float, digits: int = 4) -> str:
-        return _long(value, digits) if value < np.inf else f"beyond {_long(beyond)}"
+    def one(value: float) -> str:
+        return _long(value) if value < np.inf else f"beyond {_long(beyond)}"
 
     shown = []
     for level in (0.5, 0.05, 0.95):
         low, high = order_interval(known, level, len(every) - len(known))
         ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
         value = float(lives[f"{name}_quantile"].sel(quantile=level))
-        shown.append(
-            (one(value, known_digits(value, np.fmax(low, 0.0), np.fmin(high, beyond))), *ends)
-        )
+        if value < np.inf:
+            value = float(stated(value, np.fmax(low, 0.0), np.fmin(high, beyond), "1")[0])
+        shown.append((one(value), *ends))
     return shown
 
 

@@ -1,7 +1,7 @@
 """The first screen of a study: the recommended design beside today's, its figures, and what to trust of them."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
@@ -52,6 +52,9 @@ MOST = 0.5
 
 _USUAL = {"mean": "mean", "deviation": "standard deviation", "percentile": "95th percentile"}
 """Statistics that each design has, by the stem of their variables."""
+
+Known = tuple[float, float, float]
+"""A value and the ends of its confidence interval, NaN where that is not known."""
 
 _INFEASIBLE = {
     Verdict.FAILS: "No simulated design satisfies the constraints",
@@ -156,14 +159,12 @@ def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Ti
     yield from _peaks(best, base, content)
 
 
-def _compared(
-    label: str, unit: str, apart: str, mine: Sequence[float], before: Sequence[float] | None = None
-) -> Tile:
+def _compared(label: str, unit: str, apart: str, mine: Known, before: Known | None = None) -> Tile:
     """A value beside that of the baseline; both with the ends of their intervals."""
     moved, good = ("", None) if before is None else change(mine, before)
     both = [mine] if before is None else [mine, before]
-    digits = [labels.known_digits(*one) for one in both]
-    shown, *old = labels.quantities([one[0] for one in both], unit, digits)
+    chosen = labels.scale(unit, [one[0] for one in both])
+    shown, *old = (labels.stated(*one, unit, chosen)[0] for one in both)
     return Tile(label, shown, "".join(old).strip("–"), moved, apart, good)
 
 
