@@ -53,12 +53,10 @@ def is_plain(one: Results) -> bool:
 def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k, one in enumerate(each(verified, "design")) if counts(one)]
-    if "case" in verified:
-        cases = texts_in(verified, "case")
-        random = texts_in(verified, "random") if "random" in verified else [""] * len(cases)
-        chosen = cases[max(rows, key=lambda k: (len(random[k].split()), k))]
-        rows = [k for k in rows if cases[k] == chosen]
-    return verified.isel(design=rows)
+    cases = texts_in(verified, "case")
+    random = texts_in(verified, "random") if "random" in verified else [""] * len(cases)
+    chosen = cases[max(rows, key=lambda k: (len(random[k].split()), k))]
+    return verified.isel(design=[k for k in rows if cases[k] == chosen])
 
 
 def counts(one: Results) -> bool:

@@ -28,7 +28,7 @@ def roles(verified: Results) -> dict[str, dict[str, str]]:
     names = texts_in(verified, "design")
     best = recommended(verified)
     found = {}
-    for case in _cases(verified, names):
+    for case in dict.fromkeys(texts_in(verified, "case")):  # in the order of the file
         chosen: dict[str, list[str]] = {}
         for end in ("original", *ENDS):
             if f"{case} {end}" in names:
@@ -43,14 +43,6 @@ def roles(verified: Results) -> dict[str, dict[str, str]]:
             chosen[light] = [light.removeprefix(f"{case} "), "lightest"]
         found[case] = {name: ", ".join(words) for name, words in chosen.items()}
     return found
-
-
-def _cases(verified: Results, names: list[str]) -> list[str]:
-    """Cases, in the order of the file."""
-    if "case" in verified:
-        return list(dict.fromkeys(texts_in(verified, "case")))
-    ends = [name.rpartition(" ") for name in names]
-    return list(dict.fromkeys(case for case, _, end in ends if end == "original"))
 
 
 def _same(verified: Results, own: Results, chosen: dict[str, list[str]]) -> str:

@@ -8,7 +8,7 @@ KIND = ResultKind(
     design_dims=("design",), optional=("rival", "constraint"), absent="no design was verified (`hpcclear run`)",
     table={
         "design": text("design", "name of the design"),
-        "case": text("design", "case of the robust design"),
+        "case": text("design", "case of the robust design", required=True),
         **estimate("mean", "design", "objective", "mean of the objective, by simulation", "_true", required=True),
         "mean_surrogate": number("design", "objective", "mean of the objective, by the surrogate"),
         "mean_error": number("design", "1", "error of the mean by the surrogate, relative to the simulated mean"),
