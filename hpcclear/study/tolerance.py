@@ -14,6 +14,7 @@ variance of paired samples).
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -98,6 +99,7 @@ def _first(length: int, designs: int, most: float) -> int:
     return few
 
 
+@lru_cache(maxsize=4)
 def stricter(scene: Scene) -> tuple[Scene, float]:
     """The scene that pairs are simulated by, and what share of a bias is left there."""
     numerics = scene.numerics

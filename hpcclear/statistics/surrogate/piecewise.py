@@ -67,6 +67,8 @@ class Piecewise:
 
     def predict(self, points: np.ndarray) -> np.ndarray:
         """Values at ``(n, d)`` points, each by its box's model; InputError outside the domain."""
+        if len(self.leaves) == 1:
+            return self.leaves[0].predict(points)
         index = self.locate(points)
         points, out = np.asarray(points, dtype=np.float64), np.empty(len(index))
         for k in np.unique(index):
