@@ -171,6 +171,17 @@ def test_options_of_another_mode_of_a_command_are_refused(words):
     assert re.search("cannot be combined with|needs --|Missing|unexpected extra", done.output)
 
 
+@pytest.mark.parametrize("words", ["init", "init --import points.csv"])
+def test_what_a_killed_command_left_goes_when_it_runs_again(tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    table = "name,x [mm],y [mm]\nO,0,0\nA,50,0\nB,150,80\nC,200,0\n"
+    (tmp_path / "points.csv").write_text(table)
+    (tmp_path / ".hpcclear-0123456789abcdef.tmp").write_text("half a scene")
+    done = CliRunner().invoke(cli, [*words.split(), "made.toml"])
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["made.toml", "points.csv"]
+
+
 @pytest.mark.parametrize(
     ("words", "fragment"),
     [

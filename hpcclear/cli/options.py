@@ -217,9 +217,12 @@ def with_how(function: Run) -> Run:
 
 
 def place_of(output: Path) -> Path:
-    """Return the place for results, with the directories above it made."""
+    """Return the place for results, with the directories above it made, and without what killed commands left there."""
+    from hpcclear.results.files import remove_leftovers
+
     with contextlib.suppress(OSError):  # reported, with a remedy, by what writes there
         output.parent.mkdir(parents=True, exist_ok=True)
+        remove_leftovers(output.parent)
     return output
 
 

@@ -110,7 +110,8 @@ def _import(source: Path, file: Path, unit: str, sketch: Path | None) -> None:
     content = importers.scene_of(drawing, str(source))
     scene = load_scene(content)
     mechanism = content["mechanism"]
-    files.write_bytes(file, importers.text_of(content, source.name, drawing.notes).encode())
+    text = importers.text_of(content, source.name, drawing.notes)
+    files.write_bytes(cli.place_of(file), text.encode())
     cli.show(
         f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints"
     )
