@@ -158,6 +158,14 @@ def front(runs: int = 2, solutions: int = 12) -> xr.Dataset:
     return dataset.dataset("front", coords, data, ATTRIBUTES).to_xarray()
 
 
+def simulated(names: list[str], samples: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Coordinates of verified designs, and what each has besides its moments: none failed, no two are equivalent."""
+    none = np.zeros(len(names), int)
+    data = {"samples": none + samples, "failed": none, "beyond_hertz": none}
+    data["equivalence"] = np.zeros((len(names), len(names)), np.int8)
+    return dict.fromkeys(("design", "rival"), np.array(names)), data
+
+
 def verification() -> xr.Dataset:
     """The original, alpha, beta, two designs of the front and the paper's for each case."""
     fronts = front()
@@ -179,8 +187,8 @@ def verification() -> xr.Dataset:
             1.0 if name == "mean" else 2e-4
         )
     data |= {name: np.array([float(row[2][name]) for row in rows]) for name in NAMES[:4]}
-    data |= {"samples": np.full(len(rows), 10_000), "failed": np.zeros(len(rows), int)}
-    coords = {"design": np.array([row[0] for row in rows])}
+    coords, more = simulated([row[0] for row in rows], 10_000)
+    data |= more | {"random": np.array([f"C {row[1]}" for row in rows])}
     return dataset.dataset("verification", coords, data, ATTRIBUTES).to_xarray()
 
 

@@ -34,14 +34,13 @@ NAMES = ("robust original", "robust alpha", "robust beta", "robust front 1", "ca
 def verified(mean, deviation, half=1e-6, **more):
     """Designs of `NAMES` with these true moments (m) and limits half as wide as given."""
     mean, deviation = np.array(mean), np.array(deviation)
-    columns = {
+    coords, columns = data.simulated([*NAMES], 100)
+    columns |= {
         "m2": np.linspace(0.1, 0.5, 5),
         "case": np.array(["robust"] * 4 + ["calm"]),
         "random": np.array(["C m2"] * 4 + ["C"]),
         "on_bounds": np.array(["", "m2 lower", "", "", ""]),
-        "samples": np.full(5, 100),
         "beyond_hertz": np.array([0, 30, 0, 0, 0]),
-        "failed": np.zeros(5, int),
         "mean_true": mean,
         "mean_lower": mean - half,
         "mean_upper": mean + half,
@@ -49,7 +48,7 @@ def verified(mean, deviation, half=1e-6, **more):
         "deviation_lower": deviation - half,
         "deviation_upper": deviation + half,
     }
-    return dataset.dataset("verification", {"design": np.array(NAMES)}, columns | more).to_xarray()
+    return dataset.dataset("verification", coords, columns | more).to_xarray()
 
 
 MEAN = [4e-4, 2e-4, 3e-4, 2.015e-4, 1e-4]
@@ -81,10 +80,12 @@ def test_the_design_to_take_is_the_one_that_nearly_all_machines_stay_lowest_with
 
 def test_the_same_design_under_other_names_is_no_choice():
     """Beta's variables are alpha's: no cost can decide between them."""
-    twice = {"m2": np.array([0.1, 0.2, 0.2, 0.3, 0.4])}
+    twice = {"m2": np.array([0.1, 0.2, 0.2, 0.3, 0.4]), "equivalence": np.zeros((5, 5), np.int8)}
+    twice["equivalence"][[1, 2], [2, 1]] = 1
     own = verified([4e-4, 2e-4, 2e-4, 3e-4, 1e-4], [6e-5, 4e-5, 4e-5, 5e-5, 1e-5], **twice)
     assert "equivalent" not in opened(own).remark
     assert "as wide" not in " ".join(opened(own).steps)
+    twice["equivalence"][[1, 2, 3, 3], [3, 3, 1, 2]] = 1
     near = verified([4e-4, 2e-4, 2e-4, 2.001e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4e-5, 1e-5], **twice)
     assert "2 equivalent designs" in opened(near).remark
 

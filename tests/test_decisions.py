@@ -99,8 +99,9 @@ def verified(verdict: Verdict, price: float, excess: list[float]):
     """Two designs and the baseline of one case, whose constraints all stand so."""
     names = ["robust alpha", "robust beta", "robust original"]
     values = np.array([1.0, 2.0, 3.0])
-    columns = {
-        "case": np.array(["robust"] * 3),
+    coords, columns = data.simulated(names, 4096)
+    columns |= {
+        "case": np.array(["robust"] * 3), "random": np.array(["C"] * 3),
         "mean_true": values, "deviation_true": 0.1 * values,
         "first_goal": np.array(["mean of f"] * 3), "second_goal": np.array(["m2"] * 3),
         "first_unit": np.array(["m"] * 3), "second_unit": np.array([""] * 3),
@@ -110,8 +111,7 @@ def verified(verdict: Verdict, price: float, excess: list[float]):
     }  # fmt: skip
     for name in ("first", "second"):
         columns |= {f"{name}_{end}": values for end in ("true", "lower", "upper")}
-    coords = {"design": np.array(names), "constraint": np.arange(1)}
-    content = dataset.dataset("verification", coords, columns)
+    content = dataset.dataset("verification", coords | {"constraint": np.arange(1)}, columns)
     content.attrs["method"] = "qmc"
     return content
 

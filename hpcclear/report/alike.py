@@ -60,7 +60,8 @@ def others(ours: Results, best: Results) -> list[str]:
     if not satisfies(best):
         return []
     bad = [text_in(one, "design") for one in each(ours, "design") if not satisfies(one)]
-    return [name for name in _twins(ours, best) if name not in (*again(ours, best), *bad)]
+    twins = {*best["rival"].values[best["equivalence"].values == 1]} - {*again(ours, best), *bad}
+    return [name for name in texts_in(ours, "design") if name in twins]
 
 
 def satisfies(one: Results) -> bool:
@@ -86,24 +87,6 @@ def again(ours: Results, best: Results) -> list[str]:
         alike &= np.isclose(variable.values, own, rtol=1e-9, atol=0.0, equal_nan=True)
     names = (str(name) for name in ours["design"].values[alike])
     return [name for name in names if name != text_in(best, "design")]
-
-
-def _overlaps(ours: Results, best: Results, word: str) -> np.ndarray:
-    lower, upper = ours[f"{word}_lower"].values, ours[f"{word}_upper"].values
-    return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
-
-
-def _twins(ours: Results, best: Results) -> list[str]:
-    """As the file states, else those whose confidence intervals overlap."""
-    names = texts_in(ours, "design")
-    own = text_in(best, "design")
-    if "equivalence" in ours:
-        stated = best["rival"].values[best["equivalence"].values == 1]
-        return [name for name in names if name in stated]
-    if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
-        return []
-    alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")
-    return [name for name, one in zip(names, alike, strict=True) if one and name != own]
 
 
 def spans(ours: Results, best: Results, names: list[str], most: int | None = None) -> str:

@@ -34,18 +34,16 @@ def steps(of: Recommended) -> list[str]:
 
 
 def beyond_hertz(best: Results) -> float:
-    """Return the share of a design's simulations outside the range of Hertz contact; 0 where that is not known."""
-    return int(best["beyond_hertz"]) / int(best["samples"]) if "beyond_hertz" in best else 0.0
+    """Return the share of a design's simulations outside the range of Hertz contact."""
+    return int(best["beyond_hertz"]) / int(best["samples"])
 
 
 def _head(of: Recommended) -> Iterator[Line]:
     """Why the design is recommended, the verdicts on its constraints, and designs that are nearly as good."""
     ours, best = of.ours, of.best
-    case = text_in(best, "case") or "of the study"
+    name, case = text_in(best, "design"), text_in(best, "case")
     count = ours.sizes["design"]
-    name = text_in(best, "design")
-    text = f"{name}: {merit(best)} of {count} simulated designs, case {case}"
-    yield Line("criterion", text)
+    yield Line("criterion", f"{name}: {merit(best)} of {count} simulated designs, case {case}")
     yield from (Line("constraint", str(one)) for one in constraints_of(best))
     if near := alike.flat(ours, best, judged(ours)):
         yield Line("near", near)
@@ -65,9 +63,8 @@ def _sure(of: Recommended) -> Iterator[Line]:
 
 def confidence(best: Results) -> str:
     """Return how well the numbers of a design are known, and what their intervals cover."""
-    count = int(best["samples"]) if "samples" in best else 0
     level = float(best.attrs.get("confidence", np.nan))
-    text = f"{count} simulations of this design"
+    text = f"{int(best['samples'])} simulations of this design"
     text += " by randomised quasi-Monte Carlo" if best.attrs.get("method") == "qmc" else ""
     if weighted := int(best.get("rare_samples", 0)):
         more = f" and {weighted} weighted ones (importance sampling)"
@@ -103,7 +100,7 @@ def _steps(of: Recommended) -> Iterator[str]:
     twins = alike.others(ours, best)
     if twins and ours.attrs.get("method") == "qmc":
         yield "a smaller study.accuracy, to separate equivalent designs"
-    elif twins and "samples" in best:
+    elif twins:
         yield f"study.verification.samples={10 * int(best['samples'])} for confidence intervals a third as wide"
 
 

@@ -82,8 +82,7 @@ def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
 
 def _lines(of: Recommended) -> Iterator[Line]:
     """Why samples failed, where, and what to do; none where all succeeded."""
-    samples = of.files.get("samples")
-    if samples is not None and "status" in samples:
+    if (samples := of.files.get("samples")) is not None:
         yield from (Line("failed", text) for text in explained(samples))
 
 

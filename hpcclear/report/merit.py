@@ -53,8 +53,7 @@ def is_plain(one: Results) -> bool:
 def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k, one in enumerate(each(verified, "design")) if counts(one)]
-    cases = texts_in(verified, "case")
-    random = texts_in(verified, "random") if "random" in verified else [""] * len(cases)
+    cases, random = (texts_in(verified, name) for name in ("case", "random"))
     chosen = cases[max(rows, key=lambda k: (len(random[k].split()), k))]
     return verified.isel(design=[k for k in rows if cases[k] == chosen])
 
@@ -87,7 +86,7 @@ def judged(ours: Results) -> np.ndarray:
     verdicts = map(verdict_of, each(ours, "design"))
     found, level = best([Verdict.HOLDS if one is None else one for one in verdicts])
     merit = ours["first_true"].values
-    if found is not Verdict.HOLDS and "constraint_excess" in ours:
+    if found is not Verdict.HOLDS:
         # none is surely within: the nearest
         excess = ours["constraint_excess"].values
         within = level & (excess <= 0.0)

@@ -181,7 +181,7 @@ def simulated(one: Results) -> list[list[str]]:
     """Return what is known of a simulated design: values with their intervals, and how many simulations."""
     tiles = _tiles(one, None, Content(Path(), {}))
     rows = [[tile.label, f"{tile.value} {tile.within}".rstrip()] for tile in tiles]
-    return rows + [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
+    return rows + [[word, f"{int(one[word])}"] for word in ("samples", "failed")]
 
 
 def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
@@ -284,8 +284,7 @@ def _accuracy(best: Results) -> Trust:
 
 def _failures(of: Recommended) -> Iterator[Trust]:
     best, samples = of.best, of.files.get("samples")
-    failed = int(best["failed"]) if "failed" in best else 0
-    if failed:
+    if failed := int(best["failed"]):
         text = f"{failed} of {int(best['samples'])} simulations of this design failed"
         yield amber(text, "quality")
     status = np.zeros(0) if samples is None else samples["status"].values
