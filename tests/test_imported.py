@@ -1,6 +1,7 @@
 """Known mechanisms in every format: bodies, joints, lengths and speeds survive `import`; damaged files get one message."""
 
 import math
+from pathlib import Path
 
 import import_files as files
 import numpy as np
@@ -11,7 +12,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.scene import load_scene
 from hpcclear.scene.importers import drawing_of, scene_of, summary, text_of
-from hpcclear.scene.importers.dxf import _UNITS
 
 NIGHTLY = pytest.mark.nightly
 STATED = dict.fromkeys(files.KINDS, "") | {"successor.csv": "mm"}
@@ -105,33 +105,41 @@ def test_a_slider_of_pmks_may_be_one_joint(tmp_path):
         files.linkage_of(tmp_path / "p")
 
 
-@pytest.mark.parametrize("code", [*_UNITS, 0, 25])
-def test_all_units_of_drawings(code, tmp_path):
-    sizes = {
-        1: 0.0254,
-        2: 0.3048,
-        4: 1e-3,
-        5: 1e-2,
-        6: 1.0,
-        10: 0.9144,
-        13: 1e-6,
-        14: 0.1,
-        21: 0.30480061,
-    }
-    data = files.drawing(files.machine(np.random.default_rng(2), 0, 1)).replace(
-        b"\n4\n", f"\n{code}\n".encode(), 1
-    )
-    (tmp_path / "d.dxf").write_bytes(data)
-    if code in (0, 25):
-        with pytest.raises(InputError, match="states no unit of lengths"):
-            drawing_of(tmp_path / "d.dxf")
-    elif code in sizes:
-        far = max(one.x for one in drawing_of(tmp_path / "d.dxf").points)
-        made = drawing_of(tmp_path / "d.dxf", "m" if code == 6 else "mm")
-        assert far == pytest.approx(
-            sizes[code] / (1 if code == 6 else 1e-3) * max(one.x for one in made.points), rel=1e-6
-        )
-        assert any("--unit" in note for note in made.notes) == (code not in (4, 6))
+SIZES = {
+    1: 0.0254,
+    2: 0.3048,
+    4: 1e-3,
+    5: 1e-2,
+    6: 1.0,
+    10: 0.9144,
+    13: 1e-6,
+    14: 0.1,
+    21: 0.30480061,
+}
+"""Of the units of a drawing, in m, by $INSUNITS."""
+
+
+def drawn_in(code: int, place: Path) -> Path:
+    """A drawing with its unit of lengths by number."""
+    data = files.drawing(files.machine(np.random.default_rng(2), 0, 1))
+    place.write_bytes(data.replace(b"\n4\n", f"\n{code}\n".encode(), 1))
+    return place
+
+
+@pytest.mark.parametrize("code", SIZES)
+def test_units_of_drawings(code, tmp_path):
+    place, unit = drawn_in(code, tmp_path / "d.dxf"), "m" if code == 6 else "mm"
+    stated, made = drawing_of(place), drawing_of(place, unit)
+    ratio = SIZES[code] / (1 if code == 6 else 1e-3)
+    far = max(one.x for one in stated.points)
+    assert far == pytest.approx(ratio * max(one.x for one in made.points), rel=1e-6)
+    assert any("--unit" in note for note in made.notes) == (code not in (4, 6))
+
+
+@pytest.mark.parametrize("code", [0, 25])
+def test_a_drawing_without_a_unit_is_refused(code, tmp_path):
+    with pytest.raises(InputError, match="states no unit of lengths"):
+        drawing_of(drawn_in(code, tmp_path / "d.dxf"))
 
 
 @pytest.mark.parametrize("name", ["table.csv", "document.linkage2", "project.pmks"])
