@@ -8,7 +8,6 @@ from commands import finish, start
 
 from hpcclear import report
 from hpcclear.cli.printing import describe
-from hpcclear.report.answer import answer
 from hpcclear.report.figures import motion
 from hpcclear.report.html.content import Content
 
@@ -33,22 +32,6 @@ def test_check_counts_the_ranks_that_reached_each_other():
 
 
 # -- sensitivity, and surrogates that do not fit ------------------------------------------------------
-
-
-def indices(first, total, error=0.01):
-    names = [f"x{k}" for k in range(len(total))]
-    columns = {"sobol_first": first, "sobol_total": total}
-    columns |= {f"{name}_error": np.full(len(total), error) for name in columns}
-    return xr.Dataset({k: ("parameter", v) for k, v in columns.items()}, {"parameter": names})
-
-
-def test_total_indices_stand_with_their_errors():
-    """Five inputs of which totals add up to 197 %, as interactions count for each."""
-    first, total = [0.35, 0.1, 0.05, 0.04, 0.02], [0.84, 0.48, 0.26, 0.22, 0.17]
-    told = answer({"verification": data.verification(), "sensitivity": indices(first, total)})
-    (whole,) = (text for name, text, *_ in told if name == "interactions")
-    assert whole.endswith("x0 84 ± 2 %, x1 48 ± 2 %, x2 26 ± 2 %, x3 22 ± 2 %, x4 17 ± 2 %")
-    assert "may exceed 100 %" in whole
 
 
 def badly_fitted() -> tuple[xr.Dataset, xr.Dataset]:
