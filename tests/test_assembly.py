@@ -3,25 +3,10 @@
 import math
 from dataclasses import replace
 
+import linkages
 import numpy as np
 import pytest
 from dense_linkage import Dense, turned
-from linkages import (
-    LINKAGES,
-    MOTOR,
-    RUB,
-    bar,
-    changed,
-    constant_speed,
-    four_bar,
-    pins,
-    quick_return,
-    six_bar,
-    slide,
-    slider_crank,
-    three_rrr,
-    v_twin,
-)
 from refusals import refused
 
 from hpcclear.base.errors import InputError
@@ -34,12 +19,12 @@ from hpcclear.scene.fields import Position
 from hpcclear.scene.planar import PlanarFixed
 
 PRESCRIBED = {
-    "slider-crank": slider_crank(tilt=0.3, offset=0.01, friction=RUB, off=0.003),
-    "four-bar": four_bar(off=0.004),
-    "v-twin": v_twin(friction=RUB),
-    "six-bar": six_bar(friction=RUB),
-    "quick-return": quick_return(friction=RUB),
-    "3-RRR": three_rrr(),
+    "slider-crank": linkages.slider_crank(tilt=0.3, offset=0.01, friction=linkages.RUB, off=0.003),
+    "four-bar": linkages.four_bar(off=0.004),
+    "v-twin": linkages.v_twin(friction=linkages.RUB),
+    "six-bar": linkages.six_bar(friction=linkages.RUB),
+    "quick-return": linkages.quick_return(friction=linkages.RUB),
+    "3-RRR": linkages.three_rrr(),
 }
 
 
@@ -64,9 +49,9 @@ def where_held(dense):
     return q
 
 
-@pytest.mark.parametrize("name", LINKAGES)
+@pytest.mark.parametrize("name", linkages.LINKAGES)
 def test_every_linkage_is_assembled_as_it_was_meant(name):
-    mechanism = LINKAGES[name]
+    mechanism = linkages.LINKAGES[name]
     assembly = assemble(mechanism)
     dense = Dense(mechanism)
     q, v = (in_dense_order(dense, assembly, x) for x in (assembly.q, assembly.v))
@@ -92,9 +77,9 @@ def open_gaps(assembly):
 
 
 def test_journals_start_where_they_are_put():
-    mechanism = slider_crank("o12", "o23")
+    mechanism = linkages.slider_crank("o12", "o23")
     joints = tuple(
-        changed(joint, start_eccentricity=Position(x=1e-4, y=-5e-5))
+        linkages.changed(joint, start_eccentricity=Position(x=1e-4, y=-5e-5))
         if joint.name == "o12"
         else joint
         for joint in mechanism.joints
@@ -104,7 +89,9 @@ def test_journals_start_where_they_are_put():
     assert gaps["o23"] < 1e-12
 
 
-@pytest.mark.parametrize(("make", "most"), [(four_bar, 2), (slider_crank, 2), (six_bar, 4)])
+@pytest.mark.parametrize(
+    ("make", "most"), [(linkages.four_bar, 2), (linkages.slider_crank, 2), (linkages.six_bar, 4)]
+)
 def test_random_start_angles_lead_to_one_of_the_assemblies(make, most):
     rng = np.random.default_rng(3)
     base, poses = make(), set()
@@ -142,8 +129,8 @@ def test_prescribed_motion_is_the_dense_model_s(name):
 # ---- what is refused ----------------------------------------------------------------------------
 def stretched(length, **points):
     """The four-bar with a coupler of another length."""
-    base = four_bar()
-    coupler = bar("coupler", length, 0.3, 0.5, tip=(0.06, 0.05))
+    base = linkages.four_bar()
+    coupler = linkages.bar("coupler", length, 0.3, 0.5, tip=(0.06, 0.05))
     return replace(base, bodies=(base.bodies[0], coupler, base.bodies[2]))
 
 
@@ -154,18 +141,18 @@ def on_two_rails():
     )
     return Mechanism(
         (
-            bar("crank", 0.05, 0.1, 0.4),
+            linkages.bar("crank", 0.05, 0.1, 0.4),
             carriage,
-            bar("rod", 0.2, 0.1, 0.1),
-            bar("tail", 0.1, 0.1, -1.0),
+            linkages.bar("rod", 0.2, 0.1, 0.1),
+            linkages.bar("tail", 0.1, 0.1, -1.0),
         ),
         (
-            *pins((), "o1 crank.a ground.o", "o2 crank.b rod.a"),
-            slide("rail", "carriage.a", "ground.o"),
-            slide("second", "carriage.b", "ground.high"),
-            *pins(("o3",), "o3 carriage.pin rod.b", "o4 tail.a rod.b"),
+            *linkages.pins((), "o1 crank.a ground.o", "o2 crank.b rod.a"),
+            linkages.slide("rail", "carriage.a", "ground.o"),
+            linkages.slide("second", "carriage.b", "ground.high"),
+            *linkages.pins(("o3",), "o3 carriage.pin rod.b", "o4 tail.a rod.b"),
         ),
-        (MOTOR,),
+        (linkages.MOTOR,),
         {"o": (0.0, 0.0), "high": (0.0, 0.1)},
     )
 
@@ -175,7 +162,7 @@ def on_two_rails():
     [
         (lambda: stretched(0.01), "joints.o3", " m': the mechanism cannot be assembled"),
         (lambda: stretched(0.4), "joints.", "cannot be assembled"),
-        (lambda: slider_crank(offset=0.4), "joints.", "cannot be assembled"),
+        (lambda: linkages.slider_crank(offset=0.4), "joints.", "cannot be assembled"),
         (on_two_rails, "joints.second", "redundant"),
     ],
 )
@@ -188,7 +175,7 @@ def test_what_cannot_be_assembled_is_refused(make, key, said):
 
 def test_a_start_in_a_dead_centre_is_refused():
     """Coupler and rocker in line: the crank cannot push them."""
-    base = four_bar()
+    base = linkages.four_bar()
     reach = 0.12 + 0.08
     crank = replace(base.bodies[0], start_angle=math.pi)
     far = math.sqrt(reach**2) - 0.04
@@ -213,15 +200,16 @@ def test_a_crank_that_cannot_turn_through_is_stopped_at_its_dead_centre():
 
 
 def test_what_is_left_free_has_no_prescribed_motion():
-    for mechanism in (four_bar("o2"), LINKAGES["chain"]):
+    for mechanism in (linkages.four_bar("o2"), linkages.LINKAGES["chain"]):
         with pytest.raises(InputError, match="left free"):
             prescribed_motion(mechanism, np.zeros(1))
 
 
 def test_a_second_drive_of_constant_speed_may_turn_twice_as_fast():
-    base = three_rrr()
+    base = linkages.three_rrr()
     drives = tuple(
-        constant_speed(f"servo{k}", f"arm{k}", 0.2 * (1 + k % 2), period=k == 0) for k in range(3)
+        linkages.constant_speed(f"servo{k}", f"arm{k}", 0.2 * (1 + k % 2), period=k == 0)
+        for k in range(3)
     )
     motion = prescribed_motion(replace(base, drives=drives), np.linspace(0, 0.3, 7))
     forest = motion.assembly.loops.forest

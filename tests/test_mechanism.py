@@ -2,23 +2,8 @@
 
 from dataclasses import replace
 
+import linkages
 import pytest
-from linkages import (
-    LINKAGES,
-    MOTOR,
-    bar,
-    changed,
-    constant_speed,
-    fixed,
-    four_bar,
-    harmonic,
-    load,
-    loose_pin,
-    pins,
-    revolute,
-    slide,
-    slider_crank,
-)  # fmt: skip
 from refusals import refused
 
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
@@ -28,7 +13,7 @@ from hpcclear.scene.contacts.guide import PlanarSlide
 from hpcclear.scene.contacts.pin_in_bearing import PlanarClearance
 from hpcclear.scene.joints import PlanarRevolute
 
-BASE = four_bar("o2", "o3")
+BASE = linkages.four_bar("o2", "o3")
 
 
 def with_body(name, **changes):
@@ -40,7 +25,7 @@ def with_body(name, **changes):
 def with_joint(name, **changes):
     """The four-bar with a changed joint."""
     joints = tuple(
-        changed(joint, **changes) if joint.name == name else joint for joint in BASE.joints
+        linkages.changed(joint, **changes) if joint.name == name else joint for joint in BASE.joints
     )
     return lambda: replace(BASE, joints=joints)
 
@@ -51,7 +36,7 @@ def with_more(table, *more):
 
 
 LONE = Body("lone", 0.1, 1e-5, points={"a": (0.0, 0.0)})
-DEAD = harmonic("swing", "rocker", 0.2, 9.0)
+DEAD = linkages.harmonic("swing", "rocker", 0.2, 9.0)
 
 BROKEN = {
     "a joint to no body": (with_joint("o2", bearing="cupler.a"), "joints.o2.bearing", "no body"),
@@ -64,26 +49,26 @@ BROKEN = {
     ),
     "no body": (lambda: replace(BASE, bodies=()), "bodies", "Add [mechanism.bodies."),
     "a drive of no body": (
-        lambda: replace(BASE, drives=(changed(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
+        lambda: replace(BASE, drives=(linkages.changed(linkages.MOTOR, body="crnk"),)), "drives.motor.body", "no such",
     ),
     "a drive of a guided body": (
-        lambda: replace(slider_crank("o12"), drives=(changed(MOTOR, body="slider"),)),
+        lambda: replace(linkages.slider_crank("o12"), drives=(linkages.changed(linkages.MOTOR, body="slider"),)),
         "drives.motor.body",
         "prismatic joint",
     ),
     "two drives of one body": (
-        with_more("drives", harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
+        with_more("drives", linkages.harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
     ),
     "two that give the period": (
         lambda: replace(
-            BASE, drives=(changed(MOTOR, period=True), changed(DEAD, period=True))
+            BASE, drives=(linkages.changed(linkages.MOTOR, period=True), linkages.changed(DEAD, period=True))
         ),
         "drives.swing.period",
         "already",
     ),
     "two periods": (with_more("drives", DEAD), "drives.swing", " s': does not repeat"),
     "turns of a drive that gives no period": (
-        with_more("drives", constant_speed("wheel", "rocker", 80.0, turns=2)), "drives.wheel.turns", "'motor' defines",
+        with_more("drives", linkages.constant_speed("wheel", "rocker", 80.0, turns=2)), "drives.wheel.turns", "'motor' defines",
     ),
     "no inertia": (
         with_body("rocker", inertia=0.0, center=(0.0, 0.0)),  # that of its pin
@@ -102,45 +87,45 @@ BROKEN = {
     ),
     "over-constrained": (
         lambda: replace(
-            four_bar(),
-            bodies=(*BASE.bodies, bar("brace", 0.1, 0.1)),
+            linkages.four_bar(),
+            bodies=(*BASE.bodies, linkages.bar("brace", 0.1, 0.1)),
             joints=(
-                *four_bar().joints,
-                *pins((), "o5 brace.a crank.b", "o6 brace.b ground.p"),
+                *linkages.four_bar().joints,
+                *linkages.pins((), "o5 brace.a crank.b", "o6 brace.b ground.p"),
             ),
         ),
         "joints.o6",
         "too many degrees of freedom",
     ),
     "too many drives": (
-        lambda: replace(four_bar(), drives=(MOTOR, constant_speed("other", "rocker", 40.0))),
+        lambda: replace(linkages.four_bar(), drives=(linkages.MOTOR, linkages.constant_speed("other", "rocker", 40.0))),
         "joints.o4",
         "remove a drive",
     ),
     "held on a body": (
-        with_more("joints", fixed("weld", "rocker.b", "coupler.b")),
+        with_more("joints", linkages.fixed("weld", "rocker.b", "coupler.b")),
         "joints.weld.line",
         "to the ground only",
     ),
     "a ground that slides": (
-        with_more("joints", slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
+        with_more("joints", linkages.slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
     ),
     "a load nowhere": (
-        with_more("loads", load("force", "gas", place="piston.pin", force=[1.0, 0.0])), "loads.gas.place", "no body",
+        with_more("loads", linkages.load("force", "gas", place="piston.pin", force=[1.0, 0.0])), "loads.gas.place", "no body",
     ),
     "a spring nowhere": (
-        with_more("loads", load("spring", "band", first="crank.a", second="crank.z", stiffness=1.0)),
+        with_more("loads", linkages.load("spring", "band", first="crank.a", second="crank.z", stiffness=1.0)),
         "loads.band.second", "no point",
     ),
     "too many joints with clearance": (
         lambda: Mechanism(
-            tuple(bar(f"bar{k}", 0.1, 0.1) for k in range(9)),
+            tuple(linkages.bar(f"bar{k}", 0.1, 0.1) for k in range(9)),
             (
-                revolute("o", "bar0.a", "ground.o"),
-                *(loose_pin(f"o{k}", f"bar{k}.a", "bar0.b", 1e-4, 1e-2) for k in range(1, 9)),
-                loose_pin("o9", "bar8.b", "ground.o", 1e-4, 1e-2),
+                linkages.revolute("o", "bar0.a", "ground.o"),
+                *(linkages.loose_pin(f"o{k}", f"bar{k}.a", "bar0.b", 1e-4, 1e-2) for k in range(1, 9)),
+                linkages.loose_pin("o9", "bar8.b", "ground.o", 1e-4, 1e-2),
             ),
-            (constant_speed("motor", "bar0", 1.0),),
+            (linkages.constant_speed("motor", "bar0", 1.0),),
         ),
         "joints",
         "more than 8",
@@ -156,9 +141,9 @@ def test_what_makes_no_mechanism_is_refused_by_name(case):
     assert len(caught.value.remedy) > 5
 
 
-@pytest.mark.parametrize("name", LINKAGES)
+@pytest.mark.parametrize("name", linkages.LINKAGES)
 def test_coordinates_less_closures_are_the_degrees_of_freedom(name):
-    mechanism = LINKAGES[name]
+    mechanism = linkages.LINKAGES[name]
     for cartesian in (False, True):
         trees = forest(mechanism, cartesian)
         rows = sum(
