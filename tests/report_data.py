@@ -319,7 +319,6 @@ def timing(ranks: int = 2) -> xr.Dataset:
     """Two ranks, two stages."""
     busy = np.array([[10.0, 5.0], [9.5, 0.0]])[:ranks]
     data = {"busy": busy, "idle": 0.1 * busy + 0.2, "compile": 0.2 * busy, "write": 0.01 * busy}
-    data["samples"] = np.array([[260, 0], [252, 0]])[:ranks]
     command = "mpiexec -n 2 hpcclear run jobs/<i>x</i>.toml -o results/x"
     coords = {"rank": np.arange(ranks), "stage": ["samples", "kriging"]}
     return dataset.dataset("timing", coords, {**data, "command": command}, ATTRIBUTES).to_xarray()

@@ -54,14 +54,9 @@ def timing(found: Results, content: Content) -> list[object]:
     wall = float(np.sum([found[name].values.sum(1) for name in _PARTS], axis=0).max())
     shares = ", ".join(f"{word} {100 * part / total:.0f} %" for word, part in spent.items())
     words = f"{count} {'rank' if count == 1 else 'ranks'}, {number(wall, 3)} s: {shares}."
-    rates = []
-    if "samples" in found and spent["computing"] > 0.0:
-        simulated = found["samples"].values
-        rate = float(simulated.sum() / found["busy"][simulated > 0].sum())
-        rates.append(f"{number(rate, 3)} samples per second and core")
-    if (samples := content.files.get("samples")) is not None:
-        rates.append(f"{number(float(np.sum(samples['rhs_evaluations'])), 3)} force evaluations")
-    return [words, f"{'; '.join(rates).capitalize()}."] if rates else [words]
+    if (samples := content.files.get("samples")) is None:
+        return [words]
+    return [words, f"{number(float(np.sum(samples['rhs_evaluations'])), 3)} force evaluations."]
 
 
 def reproduce(content: Content) -> list[object]:

@@ -126,10 +126,6 @@ def _about(of: Recommended) -> Iterator[str]:
         yield from (f"over the load cases of {v.name}" for v in study.variables if v.over)
         if len(study.cases) > 1:
             yield f"case {text_in(of.best, 'case')} of {', '.join(one.name for one in study.cases)}"
-    timing, designs = of.files.get("timing"), of.files["verification"].sizes["design"]
-    if timing is not None and "samples" in timing:
-        count = f"{int(timing['samples'].values.sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
-        yield f"{count} simulations of {designs} designs and a surrogate"
 
 
 def _statistics(best: Results) -> dict[str, str]:

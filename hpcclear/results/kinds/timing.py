@@ -11,7 +11,6 @@ KIND = ResultKind(
         "idle": number("rank stage", "s", "time spent waiting for other ranks", required=True),
         "compile": number("rank stage", "s", "time spent compiling", required=True),
         "write": number("rank stage", "s", "time spent writing checkpoints and results", required=True),
-        "samples": count("rank stage", "number of samples simulated"),
         "command": text("", "the command that was run", required=True),
     },
 )
