@@ -122,7 +122,7 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
     for level in LEVELS if drawn else LEVELS[:1]:
         label = f"P{100 * level:.0f} of f" if level != 0.5 else "median of f"
         lines.append(Line(label, *_quantile(f, level, unit, drawn)))
-    for joint in samples["joint"].values if drawn and "peak_contact_force" in samples else ():
+    for joint in samples["joint"].values if drawn else ():
         peak = samples["peak_contact_force"].sel(joint=joint).values
         if np.nanmax(peak, initial=0.0) > 0.0:
             lines.append(Line(f"P95 peak force, {joint}", *_quantile(peak, 0.95, "N", drawn)))
@@ -187,7 +187,7 @@ def remarks(samples: Results) -> list[str]:
     if "regime" not in samples and sensitive.any():
         worst = float(np.nanmax((half_width / np.abs(f))[sensitive]))
         found.append((int(sensitive.sum()), bearings.sensitive_words(worst, samples)))
-    flags = samples["flags"].values if "flags" in samples else np.zeros(len(f), int)
+    flags = samples["flags"].values
     counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
     found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
     return [f"{count} of {len(f)} samples: {text}" for count, text in found]

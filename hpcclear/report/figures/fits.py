@@ -36,7 +36,7 @@ def verdict(r2: float) -> str:
 
 def warnings(kind: str, content: Results | None) -> list[str]:
     """Return a sentence for each surrogate of a file (kind ``sensitivity`` or ``kriging``) that does not fit."""
-    if content is None or "r2" not in content:
+    if content is None:
         return []
     model = "Kriging model" if "surrogate" not in content else "surrogate"
     word, known = ("response surface", of_surfaces) if kind == "sensitivity" else (model, of_models)

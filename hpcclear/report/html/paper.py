@@ -22,7 +22,7 @@ _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. 
 
 def readings(found: Results) -> list[object]:
     """How far the paper's designs are from what it prints, under the possible readings of its text."""
-    far = found["distance"].values if "distance" in found else np.array([])
+    far = found["distance"].values
     if not np.isfinite(far).any():
         return []
     ends = {"nearest": np.nanargmin(far), "farthest": np.nanargmax(far)}

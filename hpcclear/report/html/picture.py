@@ -104,7 +104,9 @@ def _design(one: Results) -> dict[str, Any]:
         "name": name,
         "case": text_in(one, "case"),
         "design": _values(one),
-        "surrogate": _predicted(one),
+        "surrogate": [
+            [words, str(labels.value(one[f"{stem}_surrogate"]))] for stem, words in _WORDS.items()
+        ],
         "direct": simulated(one),
         "response": "original" if is_original else name,
         "goals": _goals(one),
@@ -115,12 +117,6 @@ def _values(one: Results) -> list[list[str]]:
     """Design variables with units; those the case does not have are left out."""
     rows = [(labels.words(v), labels.value(v)) for v in labels.design_variables(one)]
     return [[name, str(value)] for name, value in rows if value != "–"]
-
-
-def _predicted(one: Results) -> list[list[str]]:
-    """Mean and standard deviation by the surrogate; none where they are not known."""
-    known = {words: one.get(f"{name}_surrogate") for name, words in _WORDS.items()}
-    return [[words, str(labels.value(own))] for words, own in known.items() if own is not None]
 
 
 def series(response: Results) -> list[dict[str, object]]:

@@ -109,7 +109,7 @@ def trust(samples: Results, content: Content) -> list[object]:
             which = _listed(hit, len(numbers))
             name = code.name.lower()
             failed.append([name, Number(len(hit)), code.message, place, code.remedy, which])
-    flags = samples["flags"].values if "flags" in samples else np.zeros(len(numbers), int)
+    flags = samples["flags"].values
     marked: list[list[object]] = []
     for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]

@@ -14,6 +14,6 @@ KIND = ResultKind(
         "failed": count("reading design", "number of simulations that failed"),
         "mean_paper": number("design", "m", "mean as printed"),
         "deviation_paper": number("design", "m", "standard deviation as printed"),
-        "distance": number("reading", "1", "root mean square of ln(mean / printed mean)"),
+        "distance": number("reading", "1", "root mean square of ln(mean / printed mean)", required=True),
     },
 )
