@@ -161,7 +161,7 @@ def front(runs: int = 2, solutions: int = 12) -> xr.Dataset:
 def simulated(names: list[str], samples: int) -> tuple[dict[str, Any], dict[str, Any]]:
     """Coordinates of verified designs, and what each has besides its moments: none failed, no two are equivalent."""
     none = np.zeros(len(names), int)
-    data = {"samples": none + samples, "failed": none, "beyond_hertz": none}
+    data = {"simulations": 18372, "samples": none + samples, "failed": none, "beyond_hertz": none}
     data["equivalence"] = np.zeros((len(names), len(names)), np.int8)
     return dict.fromkeys(("design", "rival"), np.array(names)), data
 

@@ -302,6 +302,7 @@ def write(
         data[name] = true[name]
     for name in ("samples", "failed", "beyond_hertz"):
         data[name] = true[name].astype(np.int64)
+    data["simulations"] = np.array(run.simulations.next)
     if true["rare_samples"].any():
         data["rare_samples"] = true["rare_samples"].astype(np.int64)
     names = np.array([choice.name for choice in choices])

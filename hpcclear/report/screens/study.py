@@ -126,6 +126,8 @@ def _about(of: Recommended) -> Iterator[str]:
         yield from (f"over the load cases of {v.name}" for v in study.variables if v.over)
         if len(study.cases) > 1:
             yield f"case {text_in(of.best, 'case')} of {', '.join(one.name for one in study.cases)}"
+    count = f"{int(of.best['simulations']):,}".replace(",", "\N{NO-BREAK SPACE}")
+    yield f"{count} simulations"
 
 
 def _statistics(best: Results) -> dict[str, str]:

@@ -60,6 +60,7 @@ KIND = ResultKind(
         "constraint_excess": number("design", "1",
             "largest violation of a constraint, relative to the threshold, at most 0 without; plus "
             "the relative distance of f where all simulations exceed it"),
+        "simulations": count("", "number of simulations of the study up to its decision", required=True),
         "samples": count("design", "number of simulations", required=True),
         "rare_samples": count("design", "number of additional simulations that decide rare failures"),
         "failed": count("design", "number of simulations that failed", required=True),
