@@ -40,7 +40,8 @@ def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> 
     sequence = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, rng=rng)
     if first:
         sequence.fast_forward(first)
-    return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `uniform`, off 0
+    whole = count if first else 2 ** (count - 1).bit_length()  # SciPy warns of other beginnings
+    return sequence.random(whole)[:count] + 0.5 * 2.0**-SOBOL_BITS  # as in `uniform`, off 0
 
 
 def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:

@@ -29,6 +29,10 @@ constraints."""
 CLOSE = 0.25
 """Of the accuracy requested: what a constraint that is not decided is known to, unless it is a probability."""
 
+FINE = 16
+"""Points of each replicate from which designs get half as many again: sequences are balanced at powers of two, and nearly so
+between them."""
+
 
 def worth_more(
     run: StudyRun,
@@ -43,6 +47,7 @@ def worth_more(
     yet, the least of those that are likely shown to keep them is. The baseline, which all are compared with, is known as
     accurately or gets as many as these."""
     settings, many, found = run.study.verification, verdicts.rivals(choices), set[int]()
+    later = [REPLICATES * longer(run, *one) for one in zip(choices, made, strict=True)]
     for case in run.study.cases:
         rows = [k for k, c in enumerate(choices) if (c.case, c.origin) == (case.name, "search")]
         rows = [k for k in rows if k not in without]
@@ -54,8 +59,9 @@ def worth_more(
         shifts = np.array([[one.shifts for one in row] for row in estimates])
         chances = np.array([shown(run, choices[k], made[k], many[k]) for k in rows])
         length = np.array([made[k][0].size for k in rows]) / settings.most_samples
+        more = np.array([later[k] <= settings.most_samples for k in rows])
         known = np.isfinite(values).all(axis=1) & (chances > 0.0)
-        holds, open_ = known & (chances == 1.0), known & (chances < 1.0) & (length <= 0.5)
+        holds, open_ = known & (chances == 1.0), known & (chances < 1.0) & more
         leaders = set[int]()
         for number, direction in enumerate(directions(case)):
             own, moved = values @ direction, np.einsum("nkr,k->nr", shifts, direction)
@@ -82,7 +88,7 @@ def worth_more(
             if (rivals & (error > 0.0)).any():
                 found.add(first)
             limit = settings.contest * made[first][0].size
-            found |= {k for k in compress(rows, rivals & holds) if 2 * made[k][0].size <= limit}
+            found |= {k for k in compress(rows, rivals & holds) if later[k] <= limit}
             if (rivals & open_).any():  # when it is decided others may win less
                 found.add(rows[int(np.where(rivals & open_, lost, 0.0).argmax())])
         most = max((made[k][0].size for k in leaders), default=0)
@@ -93,7 +99,16 @@ def worth_more(
             and made[k][0].size < most
             and not _accurate(run, one, made[k], wanted[k], many[k])
         }
-    return sorted(k for k in found if 2 * made[k][0].size <= settings.most_samples)
+    return sorted(k for k in found if later[k] <= settings.most_samples)
+
+
+def longer(run: StudyRun, choice: Choice, values: Array) -> int:
+    """Points of each replicate that a design gets next: where each look at constraints costs certainty, twice as many."""
+    kept, settings = run.study.case(choice.case).kept, run.study.verification
+    decides = any(not (goal.exact or verdicts.rare(goal, settings)) for goal in kept)
+    length = values.shape[2]
+    power = 2 ** (length.bit_length() - 1)
+    return power * 3 // 2 if length == power >= FINE and not decides else 2 * power
 
 
 def directions(case: Case) -> Array:

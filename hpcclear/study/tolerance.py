@@ -93,7 +93,7 @@ def _most(study: Study, others: int) -> float:
 
 def _first(length: int, designs: int, most: float) -> int:
     """Points of each replicate, of so many, that pairs are made of at first: a power of two."""
-    few = max(min(FEW, length), 1)
+    few = 2 ** (max(min(FEW, length), 1).bit_length() - 1)
     while few > 1 and designs * REPLICATES * few > most:
         few //= 2
     return few
@@ -198,15 +198,16 @@ def _lengthened(
         taken = _known(run, designs, made, strict)
         spent = sum(one[0].size for one in strict)
         length = strict[rows[0]].shape[2]
+        more = contest.longer(run, designs[rows[0]], strict[rows[0]]) - length
         rows = [
             k for k in rows
-            if 2 * strict[k].shape[2] <= made[k].shape[2]
+            if contest.longer(run, designs[k], strict[k]) <= made[k].shape[2]
             and _hidden(run, designs[k], made[k], taken.error[k])
         ]  # fmt: skip
-        if not rows or spent + len(rows) * REPLICATES * length > most:
+        if not rows or spent + len(rows) * REPLICATES * more > most:
             return taken
         tight = run.of(stricter(run.scene)[0])
-        truth.lengthen(tight, designs, strict, rows, "pairs", length)
+        truth.lengthen(tight, designs, strict, rows, "pairs", more)
         run.simulations.next = tight.simulations.next
 
 

@@ -74,9 +74,10 @@ def made(
     found = list(before) or begun(run, choices)
     wanted = wanted or [run.study.wanted] * len(choices)
     while rows := contest.worth_more(run, choices, found, wanted, without):
-        length = min(found[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
-        rows = [k for k in rows if found[k].shape[2] == length]
-        lengthen(run, choices, found, rows, "verification", length)
+        ends = {k: (found[k].shape[2], contest.longer(run, choices[k], found[k])) for k in rows}
+        first, last = least = min(ends.values())
+        rows = [k for k in rows if ends[k] == least]
+        lengthen(run, choices, found, rows, "verification", last - first)
     return found
 
 
