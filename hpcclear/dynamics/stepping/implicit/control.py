@@ -24,7 +24,8 @@ FAILED_SHRINK = 0.1  # at most, after the iteration failed
 CEILING, CEILING_GROWTH = 0.6, 1.05
 """Of the failed step, for those after it; and how that is forgotten, step by step."""
 
-CALM_STIFFNESS = 2.0  # h |J| below which the explicit method would do
+CALM_STIFFNESS, CALM_GROWTH = 2.0, 1.1
+"""h |J| below which the explicit method would do; and growth of a step above which not: what that stirred up dies away."""
 
 STEEP = 100.0
 """Friction coefficient over ramp speed, s/m, from which kinks decide how long implicit steps are, and "auto" is implicit."""
@@ -197,7 +198,7 @@ def propose(lane, W, work, m, i, iterations):
         proposal = max(proposal, work[at.RESUMED * W + lane])
         if m[mem.RATE + i] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
             proposal = h
-        calm = h * m[mem.NORM + i] < CALM_STIFFNESS and proposal < 2.0 * h
+        calm = h * m[mem.NORM + i] < CALM_STIFFNESS and proposal < CALM_GROWTH * h
         work[at.CALM * W + lane] = work[at.CALM * W + lane] + 1.0 if calm else 0.0
     work[at.NEXT_STEP * W + lane] = proposal
 
