@@ -76,7 +76,7 @@ def test_dropped_steps_change_no_instant_s_state(monkeypatch, kind: str):
     even = np.linspace(0.0, lengths.sum(), 101)
     assert (np.diff(piece.times) > 0.0).all()
     assert np.abs(piece.times - even).max() < 0.5 * even[1]  # some eight rows are held for each
-    q, v, s = recorded._state(piece, 0.0)
+    q, v, _, s = recorded._state(piece, 0.0)
     assert ((s >= 0.0) & (s <= 1.0)).all()
     np.testing.assert_allclose(q[:, 0], np.sin(piece.times), atol=1e-9)
     np.testing.assert_allclose(v[:, 0], np.cos(piece.times), atol=1e-8)

@@ -54,6 +54,18 @@ def test_film_and_contact_at_once(roughness):
     assert (closes(scene).out.deepest[:2] > 1e-6).all()
 
 
+@pytest.mark.parametrize(
+    ("speed", "viscosity"), [("50 rpm", 0.01), ("5 rpm", 0.01), ("5 rpm", 1.0)]
+)
+def test_slow_bearings_take_few_steps_and_show_their_peaks_between_them(speed, viscosity):
+    """Explicit steps are held up by the oil for ever; and a film multiplies what velocities between two steps are off by."""
+    scene = oiled(viscosity=viscosity, clearance="0.02 mm")
+    response = simulate(scene.with_({"drive.speed": speed, "effects.slider_load": -200.0}))
+    assert (int(response.status), response.rhs_evaluations < 60_000) == (Status.OK, True)
+    shown = response.contact_force.max("time")
+    np.testing.assert_allclose(shown, response.peak_contact_force, rtol=0.01)
+
+
 # ---- one law, whoever writes it down ------------------------------------------------------------------------
 
 

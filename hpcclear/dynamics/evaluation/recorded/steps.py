@@ -69,23 +69,18 @@ class Recorded:
     _lanes: Lanes
     _start: Start
 
-    def observe(
-        self, states: Array, contacts: Array, turn_time: Array, began: Array
-    ) -> tuple[Array, Rates, Array]:
-        """Accelerations (t, n), rates and forces of pins (t, 2, MAX_PINS) at states (t, 2 n), contacts
-        (t, 2 MAX_JOINTS), times in the revolution (t,) and when that began (t,)."""
-        out = self._lanes.observe(self.par, states, contacts, turn_time, began)
-        n = self.problem.coordinates
-        rates, pins = np.split(out[:, n:], [at.RATES], axis=1)
-        return out[:, :n], Rates(rates), pins.reshape(-1, 2, at.MAX_PINS)
+    def observe(self, states: Array, contacts: Array, turn_time: Array, began: Array) -> Array:
+        """Accelerations (t, n), then rates and forces of pins, as columns, at states (t, 2 n), contacts (t, 2 MAX_JOINTS),
+        times in the revolution (t,) and when that began (t,)."""
+        return self._lanes.observe(self.par, states, contacts, turn_time, began)
 
     def first_row(self) -> Array:
         """The row (1, columns) of the start."""
         n, start, none = self.problem.coordinates, self._start, np.zeros(1)
-        accelerations = self.observe(start.state(n), start.contacts, none, none)[0]
         row = np.zeros((1, rec.columns(n)))
         row[:, rec.CONTACTS : rec.DRIVE_WORK] = start.contacts
-        row[:, rec.STATE :] = np.hstack([start.state(n), accelerations])
+        seen = self.observe(start.state(n), start.contacts, none, none)
+        row[:, rec.STATE :] = np.hstack([start.state(n), seen[:, :n]])
         return row
 
 
@@ -243,20 +238,43 @@ def _thinned(rows: Array, broken: Booleans) -> tuple[Array, Booleans]:
 
 def seen_between(sample: Recorded, piece: Piece, *, works: bool = False) -> ResponseStates:
     """What the motion is at the instants of a piece; `works`: those too, else there are none."""
-    wraps = sample.problem.wraps
-    q, v, share = _state(piece, wraps)
+    wraps, n = sample.problem.wraps, sample.problem.coordinates
+    q, v, a, s = _state(piece, wraps)
     steps, k = piece.steps, piece.k
     revolution, contacts = steps.revolution[k], steps.contacts[k]
-    began = (steps.time - steps.turn_time)[k]
-    turn_time = piece.times - began
+    began = steps.time - steps.turn_time
+    turn_time = piece.times - began[k]
     q = q - wraps * revolution[:, None]  # counted as the kernel does
-    _, rates, pins = sample.observe(np.hstack([q, v]), contacts, turn_time, began)
-    done = _works(sample, piece, share[:, None]) if works else np.zeros((len(k), 0))
-    return ResponseStates(q, v, turn_time, revolution, contacts, rates, done, pins)
+    seen = sample.observe(np.hstack([q, v]), contacts, turn_time, began[k])
+    stiff, done = sample.problem.implicit != "never", np.zeros((len(k), 0))
+    if works or stiff:
+        after = np.minimum(k + 1, len(steps.time) - 1)
+        rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
+        states = np.hstack([steps.q[rows], steps.v[rows]])
+        at_rows = sample.observe(states, steps.contacts[rows], steps.turn_time[rows], began[rows])
+        ends = np.split(at_rows[where], 2)
+        h = (steps.time[after] - steps.time[k])[:, None]
+        p0, p1 = (h * Rates(one[:, n : n + at.RATES]).powers for one in ends)
+        done = cubic(steps.works[k], p0, steps.works[after], p1, s)
+        if stiff:
+            _calm(seen, a, ends[0] + s * (ends[1] - ends[0]))
+    rates, pins = np.split(seen[:, n:], [at.RATES], axis=1)
+    pins = pins.reshape(-1, 2, at.MAX_PINS)
+    return ResponseStates(q, v, turn_time, revolution, contacts, Rates(rates), done, pins)
 
 
-def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array]:
-    """Coordinates and velocities (t, n) at the instants, and how far each lies in its step, from 0 to 1 (t,).
+def _calm(seen: Array, a: Array, between: Array) -> None:
+    """Replace what was `seen` where it is further from the accelerations of an instant, `a` (t, n), than what lies `between`
+    the ends of the step: films and bristles multiply what a velocity is off by. Gaps go by positions alone, and stay."""
+    n = a.shape[1]
+    size = np.abs(between[:, :n]).max(axis=0, initial=1e-300)
+    off, less = ((np.abs(one[:, :n] - a) / size).max(axis=1) for one in (seen, between))
+    between[:, n : n + at.FORCE] = seen[:, n : n + at.FORCE]
+    np.copyto(seen, between, where=(off > less)[:, None])
+
+
+def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array, Array]:
+    """Coordinates, velocities and accelerations (t, n) at the instants, and how far each lies in its step, from 0 to 1 (t, 1).
 
     Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
     accurate as the integrator; angles that restart with every revolution, by `wraps` (n,), are unwrapped first.
@@ -275,20 +293,5 @@ def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array]:
     c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
     position = q0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
     velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
-    return position, velocity, s[:, 0]
-
-
-def _works(sample: Recorded, piece: Piece, s: Array) -> Array:
-    """Works (t, 4) at shares (t, 1) of steps, by the cubic through works and powers at both ends of the step."""
-    steps, k = piece.steps, piece.k
-    after = np.minimum(k + 1, len(steps.time) - 1)
-    rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
-    ends = np.hstack([steps.q[rows], steps.v[rows]])
-    turn_time = steps.turn_time[rows]
-    began = steps.time[rows] - turn_time
-    powers = sample.observe(ends, steps.contacts[rows], turn_time, began)[1].powers
-    before, behind = np.split(powers[where], 2)
-    h = (steps.time[after] - steps.time[k])[:, None]
-    w0, w1 = steps.works[k], steps.works[after]
-    p0, p1 = h * before, h * behind
-    return cubic(w0, p0, w1, p1, s)
+    acceleration = (a0 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / (h * h)
+    return position, velocity, acceleration, s
