@@ -199,12 +199,12 @@ def _eccentricities(loops: Loops) -> Array:
 def _closed(loops: Loops, rough: Array, wanted: Array) -> Array:
     """From rough angles; where these lead into a corner, from angles near them, further and further off."""
     rng = np.random.default_rng(0)  # the same tries for the same mechanism
-    guided = {split(joint.point)[0] for joint in loops.mechanism.joints if joint.kind == "slide"}
-    turns = (c.kind == "angle" and c.body not in guided for c in loops.forest.coordinates)
-    angles = np.array([*turns], float)
+    followed, movers = _followed(loops.mechanism), loops.forest.coordinates
+    turns = [(one.body, followed[one.body][0]) if one.kind == "angle" else () for one in movers]
+    shares = np.array([[bool(one) and one[1:] == other[:1] for other in turns] for one in turns])
     nearest: tuple[float, int] = (math.inf, 0)
     for reach in (0.0, *np.linspace(0.2, 1.5, MOST_TRIES)):
-        turned = reach * angles * rng.normal(size=loops.size)
+        turned = reach * shares @ rng.normal(size=loops.size)
         q, left, worst = _newton(loops, rough + turned[:, None], wanted)
         if left[0] <= NEARLY * loops.scales.max():
             return q
@@ -256,33 +256,40 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, Array, Intege
 
 def rough_pose(loops: Loops) -> Array:
     """Coordinates (n,) or (n, m) of the bodies at their start angles, hung one after the other on what stands already."""
-    mechanism = loops.mechanism
-    placed: dict[str, tuple[Any, Number]] = {GROUND: (0j, 0.0)}
-    bodies = {body.name: body for body in mechanism.bodies}
-
-    def at(place: str) -> Any:
-        name, _ = split(place)
-        origin, angle = placed[name]
-        return origin + as_complex(mechanism.at(place)) * np.exp(1j * angle)
-
-    while len(placed) <= len(bodies):
+    mechanism, followed = loops.mechanism, _followed(loops.mechanism)
+    turns = {name: np.exp(1j * np.asarray(angle)) for name, (_, angle) in followed.items()}
+    origins: dict[str, Any] = {GROUND: 0j}
+    while len(origins) <= len(mechanism.bodies):
         for joint in mechanism.joints:
             for own, other in (places_of(joint), places_of(joint)[::-1]):
                 body, carrier = split(own)[0], split(other)[0]
-                if body in placed or carrier not in placed:
-                    continue
-                angle: Number = bodies[body].start_angle
-                if joint.kind in ("slide", "fixed"):
-                    turned = joint.angle if own == joint.point else -joint.angle
-                    angle = placed[carrier][1] + turned
-                turn = np.exp(1j * np.asarray(angle))
-                placed[body] = (at(other) - as_complex(mechanism.at(own)) * turn, angle)
+                if body not in origins and carrier in origins:
+                    there = origins[carrier] + as_complex(mechanism.at(other)) * turns[carrier]
+                    origins[body] = there - as_complex(mechanism.at(own)) * turns[body]
     found = []
     for one in loops.forest.coordinates:
-        origin, angle = placed[one.body]
-        centre = origin + as_complex(bodies[one.body].center) * np.exp(1j * np.asarray(angle))
-        found.append({"x": centre.real, "y": centre.imag, "angle": angle}[one.kind])
+        name, arm = one.body, as_complex(mechanism.body(one.body).center)
+        centre = origins[name] + arm * turns[name]
+        found.append({"x": centre.real, "y": centre.imag, "angle": followed[name][1]}[one.kind])
     return np.array(np.broadcast_arrays(*found), float)
+
+
+def _followed(mechanism: Mechanism) -> dict[str, tuple[str, Number]]:
+    """Of each body the one that gives it its angle at the start by guides, and that angle: the ground, a driven body, one that
+    has a start angle, or one that carries guides, in this order. Else a body may face backwards, which meets its constraint."""
+    guides = [joint for joint in mechanism.joints if joint.kind in ("slide", "fixed")]
+    turned = [(split(one.line)[0], split(one.point)[0], one.angle) for one in guides]
+    ways = turned + [(body, carrier, -angle) for carrier, body, angle in turned]
+    starts = {GROUND: 0.0} | {one.name: one.start_angle for one in mechanism.bodies}
+    guided = {body for _, body, _ in turned}
+    names = sorted(starts, key=lambda name: (not np.any(starts[name]), name in guided))
+    found: dict[str, tuple[str, Number]] = {}
+    for first in (GROUND, *(drive.body for drive in mechanism.drives), *names):
+        found.setdefault(first, (first, starts[first]))
+        for one, other, angle in ways * len(ways):
+            if one in found:
+                found.setdefault(other, (found[one][0], found[one][1] + angle))
+    return found
 
 
 def check_redundant(mechanism: Mechanism) -> None:
