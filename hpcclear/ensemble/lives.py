@@ -69,15 +69,7 @@ def lives_dataset(
     values = _curves(found, len(cycles), len(scene.joint_labels))
     data: dict[str, np.ndarray] = {
         **values,
-        "clearance_limit": np.stack([one.limit for one in lives]),
-        "clearance_error": np.stack([one.error for one in lives]),
-        "drift": np.array([one.drift for one in lives]),
-        "end_reason": np.array([_reason(one) for one in lives], dtype=str),
-        "ended": np.array([one.ended for one in lives]),
-        "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
-        "simulations": np.array([one.simulations for one in lives]),
-        "ending": np.array([int(one.status) for one in lives], np.int8),
-        "flags": np.array([int(Flag.TARGET_MISSED) * (not one.certain) for one in lives], np.int8),
+        **_of_lives(lives),
         "lifetime": ends,
         "lifetime_hours": ends * times / HOUR,
         "revolution_time": times,
@@ -110,6 +102,21 @@ def _curves(found: list[Curves], ages: int, labels: int) -> dict[str, Array]:
     others = {name: _stacked(found, name) for name in ("clearance", "objective")}
     peaks = np.stack([one.peak if one.peak.shape[1] else unknown for one in found])
     return {**depths, **others, "peak_contact_force": peaks}
+
+
+def _of_lives(lives: list[Life]) -> dict[str, Array]:
+    """How each life went, and what it cost."""
+    return {
+        "clearance_limit": np.stack([one.limit for one in lives]),
+        "clearance_error": np.stack([one.error for one in lives]),
+        "drift": np.array([one.drift for one in lives]),
+        "end_reason": np.array([_reason(one) for one in lives], dtype=str),
+        "ended": np.array([one.ended for one in lives]),
+        "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
+        "simulations": np.array([one.simulations for one in lives]),
+        "ending": np.array([int(one.status) for one in lives], np.int8),
+        "flags": np.array([int(Flag.TARGET_MISSED) * (not one.certain) for one in lives], np.int8),
+    }
 
 
 def _causes(inputs: Points, joints: Joints, lives: list[Life], last: list[Curves]) -> Array:
