@@ -1,14 +1,17 @@
 """The `reproduce` command: results that are what their scenes come to here, and such that are not."""
 
+from dataclasses import replace
+
 import numpy as np
 import opened
 import pytest
 from click.testing import CliRunner
 from commands import CHEAP, SCENE
 
-from hpcclear import evaluate, load_scene, simulate
+from hpcclear import evaluate, load_scene, simulate, to_table
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
+from hpcclear.ensemble.api import as_points, evaluated
 from hpcclear.ensemble.repeating import repeated
 from hpcclear.results.crate import write_crate
 
@@ -96,3 +99,20 @@ def test_a_scene_that_is_none_is_refused(made, tmp_path):
 def test_a_place_without_results_is_refused(tmp_path):
     with pytest.raises(InputError, match="no result file"):
         list(repeated(tmp_path, 5))
+
+
+def test_rows_of_tables_and_names_of_designs_are_repeated_and_exported_in_words(tmp_path):
+    scene = load_scene(SCENE.with_name("tolerances.toml"), CHEAP)
+    points = as_points(scene, {"rod": [0, 1], "fit": [3, 0], "t_u2": [1e-3, 2e-3]})
+    content = evaluated(scene, replace(points, labels=("old", "new")))
+    opened.write(content, tmp_path / "samples.nc")
+    (found,) = repeated(tmp_path, 5)
+    assert (found.extent, found.differing) == ("2 of 2 samples", ())
+    assert content["objective"].values[0] != content["objective"].values[1]
+    table = to_table(opened.read(tmp_path / "samples.nc"))
+    assert table[["rod", "fit", "t_u2 [mm]", "label"]].values.tolist() == [
+        ["steel", "40 H6/g5", 1.0, "old"], ["aluminium", "40 H8/e8", 2.0, "new"],
+    ]  # fmt: skip
+    for name, value in (("rod", 2), ("rod", 0.5), ("rod", np.nan), ("t_u2", np.nan)):
+        with pytest.raises(InputError, match=r"of a row|must be finite"):
+            evaluated(scene, as_points(scene, {name: value}))

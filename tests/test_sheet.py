@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import opened
@@ -23,17 +24,8 @@ from hpcclear.report.sheet import SheetContent
 QUICKSTART = Path(__file__).parents[1] / "jobs" / "quickstart.toml"
 
 WORDS = (
-    "Pleuelstange",
-    "für",
-    "größte",
-    "Kräfte",
-    "Lagerspiel",
-    "W" * 90,
-    "1\N{NO-BREAK SPACE}000",
-    "\u6f22",
-    "$x_1$",
-    "a\tb",
-)
+    "Pleuelstange", "für", "größte", "Kräfte", "Lagerspiel", "W" * 90, "1\N{NO-BREAK SPACE}000", "\u6f22", "$x_1$", "a\tb",
+)  # fmt: skip
 
 
 def text_of(rng: np.random.Generator, words: int) -> str:
@@ -178,3 +170,9 @@ def test_what_a_scene_is_about_stands_on_page_and_sheet(tmp_path: Path) -> None:
     assert screen_of(content).title == ABOUT["title"]
     assert any("C uniform" in text for text in sheet.assumptions)
     assert any("m2 0.105 to 0.42 kg" in text for text in sheet.limits)
+
+
+def test_a_relative_random_input_has_no_unit_of_its_entry() -> None:
+    scene = load_scene(QUICKSTART.with_name("tolerances.toml"))
+    words = " ".join(sheets._assumptions(SimpleNamespace(scene=scene)))
+    assert "m3 uniform, -0.01 to 0.01 of the design." in words

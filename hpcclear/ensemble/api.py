@@ -16,7 +16,7 @@ from hpcclear.ensemble.session import samples_of
 from hpcclear.results.content import Results
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points, check_apart, check_points, entries_of
+from hpcclear.scene.points import Points, check_apart, check_points, entries_of, expanded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,13 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     except ValueError as error:
         remedy = "Give numbers in SI, one or as many as the others have, for each name"
         raise InputError("points", list(given), str(error).removesuffix("."), remedy) from None
-    made = Points(names, values, tuple(paths_of(scene, name) for name in names))
+    every = () if scene.study is None else scene.study.variables
+    others = {one.name: range(len(one.rows)) for one in every if not one.paths}
+    for name, column in zip(names, values.T, strict=True):
+        if (rows := others.get(name)) and not np.isin(column, rows).all():
+            raise InputError("points", name, "is no number of a row", f"Write 0 to {rows[-1]}")
+    paths = tuple(() if name in others else paths_of(scene, name) for name in names)
+    made = Points(names, values, paths)
     check_apart("points", "columns", names, made.paths)
     check_points(scene, made)
     return made
@@ -82,6 +88,7 @@ def evaluate(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> xr.Datas
 
 def evaluated(scene: Scene, points: Points) -> Results:
     """Simulate points as `evaluate` does; the content of a file of samples."""
-    records = asked(evaluate_records(scene, points), scene.objective)
-    about = scene.origin | program() | recorded(scene, records), scene.objective, scene.joint_labels
-    return samples_of(points, records, *about)
+    sent = expanded(scene.study, points)
+    records = asked(evaluate_records(scene, sent), scene.objective)
+    about = scene.origin | program() | recorded(scene, records)
+    return samples_of(scene, points, records, about)

@@ -183,10 +183,8 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
     count = min(FIRST, book.plan.most)
     pending = [one for one in variants if book.replicates(one) < count]
     while pending:
-        every = (
-            VariantRequest(one, book.replicates(one), count)
-            for one in dict.fromkeys([(), *pending])
-        )
+        names = dict.fromkeys([(), *pending])
+        every = (VariantRequest(one, book.replicates(one), count) for one in names)
         asked = [one for one in every if one.first < count]
         for one, seen in zip(asked, (yield asked), strict=True):
             book.seen.setdefault(one.off, []).append(seen)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcclear.base.errors import InputError, at
+from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.units import note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
@@ -112,6 +113,6 @@ def run_map(
         records = sample_points(scene, points, *where, stage="map", maker=make_mapper, record=kind)
         attributes = {**session.attributes, SHAPE: " ".join(map(str, shape))}
         with saving(checkpoint.flush):
-            return session.write(samples_of(points, records, attributes, joints=session.joints))
+            return session.write(samples_of(scene, points, records, attributes, MEAN_GAP))
 
     return Session(place, key, ranks, options).finished("samples", make)

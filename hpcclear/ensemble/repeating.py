@@ -76,8 +76,9 @@ def _samples(content: Results, scene: Scene) -> Results:
     """The same designs, simulated here."""
     rows = labels.design_variables(content)
     values = {str(one.attrs.get("scene_path", one.name)): one.values for one in rows}
-    points = as_points(scene, values)
-    return evaluated(scene, replace(points, names=tuple(one.name for one in rows)))
+    names = tuple(one.name for one in rows)
+    named = tuple(content["label"].values) if "label" in content else ()
+    return evaluated(scene, replace(as_points(scene, values), names=names, labels=named))
 
 
 def _series(content: Results, scene: Scene) -> tuple[Results, Results]:

@@ -20,7 +20,7 @@ import numpy as np
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.lock import Lock
-from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.evaluation.steady.wording import recorded
@@ -43,6 +43,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, expanded, latin_hypercube, read_points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.scene import record_of
+from hpcclear.scene.study import Study
 
 
 @dataclass(frozen=True)
@@ -337,22 +338,32 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Res
 def _write(session: Session, scene: Scene, points: Points, records: Records) -> Results:
     """Write the file of samples; returns what was written."""
     attributes = session.attributes | recorded(scene, records)
-    return session.write(samples_of(points, records, attributes, scene.objective, session.joints))
+    return session.write(samples_of(scene, points, records, attributes))
+
+
+def describe_variables(content: Results, study: Study | None) -> Results:
+    """Describe the design variables that are no number of the mechanism: unit, rows to choose from, random inputs they set."""
+    for variable in () if study is None else study.variables:
+        own = content.get(variable.name)
+        if own is not None and (variable.rows or variable.silent):
+            own.attrs |= {"units": variable.unit or "1", "long_name": variable.words}
+            if variable.rows:
+                own.attrs["options"] = "; ".join(row.name for row in variable.rows)
+            if variable.silent:
+                own.attrs["of_random_inputs"] = ", ".join(variable.input_paths)
+    return content
 
 
 def samples_of(
-    points: Points,
-    records: Records,
-    attributes: Mapping[str, str],
-    objective: Objective = MEAN_GAP,
-    joints: Sequence[str] = JOINTS,
-) -> Results:
-    """A dataset of kind ``samples`` of points and what became of them, a record each."""
+    scene: Scene, points: Points, records: Records, attributes: Mapping[str, str], objective: Objective | None = None
+) -> Results:  # fmt: skip
+    """A dataset of kind ``samples`` of points and what became of them, a record each; `objective`: by default the scene's."""
     about = {**attributes, "sampling": points.sampling} if points.sampling else attributes
-    return dataset.samples_dataset(
-        points.names, points.values, points.units, records, about, objective,
-        points.words, joints, points.labels,
+    content = dataset.samples_dataset(
+        points.names, points.values, points.units, records, about, objective or scene.objective,
+        points.words, scene.joint_labels, points.labels,
     )  # fmt: skip
+    return describe_variables(content, scene.study)
 
 
 def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:

@@ -119,7 +119,7 @@ class _Streaming:
     def __init__(
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
     ) -> None:
-        self._payload, self._objective = payload_of(scene, points.page(0)), scene.objective
+        self._payload, self._scene = payload_of(scene, points.page(0)), scene
         self._points, self._session, self._raw = points, session, raw
         self._checkpoint = session.opened(scene)
         self._sums = self._new_sums()
@@ -142,8 +142,8 @@ class _Streaming:
     def _keep(self, number: int, records: np.ndarray) -> None:
         """Write block `number`, all of its records in order, shape (m,)."""
         assert self._raw is not None
-        about = self._session.attributes, self._objective, self._session.joints
-        content = samples_of(self._points.page(number), records, *about)
+        page, about = self._points.page(number), self._session.attributes
+        content = samples_of(self._scene, page, records, about)
         dataset.write(content, _kept(self._raw, number))
 
     def run(self) -> Results:
@@ -153,7 +153,7 @@ class _Streaming:
         with saving(self._save), LongProgress("samples", style, sums.total, sums.taken) as progress:
             while (left := sums.remaining(1 if sums.edges is None else TOGETHER)).size:
                 self._simulate(left, progress)
-        about = self._session.attributes, self._objective, self._session.joints
+        about = self._session.attributes, self._scene.objective, self._session.joints
         return self._session.write(statistics_dataset(self._sums, *about))
 
     def _save(self) -> None:

@@ -86,12 +86,9 @@ def read_measured(
     if seconds is not None:
         known = float((place[-1] - place[0]) / (seconds[-1] - seconds[0]))
     if given and abs(known - frequency) > FAR * frequency:
-        reason = (
-            f"its time and angle give {60 * known:.4g} rpm, and the scene {60 * frequency:.4g} rpm"
-        )
-        raise InputError(
-            key, str(path), reason, "Correct the unit of its time, or the drive's speed"
-        )
+        speeds = f"{60 * known:.4g} rpm, and the scene {60 * frequency:.4g} rpm"
+        remedy = "Correct the unit of its time, or the drive's speed"
+        raise InputError(key, str(path), f"its time and angle give {speeds}", remedy)
     highest = min(ORDERS, int(NYQUIST * rate))
     return Measured(name, Spectrum.of(found), angle is not None, known, highest, rate)
 

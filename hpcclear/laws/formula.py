@@ -62,9 +62,7 @@ def _check_si(name: str, unit: str) -> None:
     except ValueError:
         return  # said of all laws alike
     if size != Fraction(1000) ** powers.get("gram", Fraction(0)):
-        reason = (
-            f"the unit {unit!r} of {name} is not an SI unit, and a formula is computed in SI units"
-        )
+        reason = f"the unit {unit!r} of {name} is not an SI unit, in which a formula is computed"
         raise LawError(reason, f'Write, say, "s/m"; the value of {name} may have any unit')
 
 

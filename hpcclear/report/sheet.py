@@ -119,8 +119,8 @@ def _assumptions(content: Content) -> Iterator[str]:
     words = [
         f"{row.name} {row.shape_words}, after {row.cycles:g} revolutions"
         if row.cycles is not None
-        else f"{row.name} {row.shape_words}, {labels.between(*row.span, scene.unit(row.paths[0]))}"
-        + ("" if row.absolute else " about the design")
+        else f"{row.name} {row.shape_words}, {labels.between(*row.span, '1' if row.relative else scene.unit(row.paths[0]))}"
+        + ("" if row.absolute else f" {'of' if row.relative else 'about'} the design")
         for row in random
     ]
     if words:

@@ -167,6 +167,8 @@ class Units:
         values, unit = variable.values, str(variable.attrs.get("units", ""))
         if "flag_meanings" in variable.attrs:
             return _words(variable), ""
+        if rows := labels.options(variable):
+            return np.array(rows, object)[values.astype(int)], ""
         if unit in ("", "1") or values.dtype.kind != "f":
             return values, ""
         if chosen := self.chosen(unit, self._own(variable)):

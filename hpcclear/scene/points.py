@@ -161,6 +161,7 @@ def check_points(scene: Scene, points: Points, label: Label = "sample {}".format
             raise InputError(f"{label(row)}, {name}", value, reason, remedy)
 
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
+        refuse(~np.isfinite(column), column, "", name, "must be finite")
         for path in paths:
             entry = quantities()[path]
             reason = f"must be finite and {entry.bounds() or 'within the physical range'}"

@@ -135,10 +135,8 @@ class Study(StudyTables):
             raise invalid(reason, f"Request {count} solutions or more", "swarm.archive")
         met = set[object]()
         for place, goal in case.rows.items():
-            key, kind = (
-                f"cases.{case.name}.{place}",
-                "objective" if place[0] == "o" else "constraint",
-            )
+            key = f"cases.{case.name}.{place}"
+            kind = "objective" if place[0] == "o" else "constraint"
             alike = kind, goal.alike(self.objective)
             if alike in met:
                 article = "an" if kind == "objective" else "a"
@@ -153,9 +151,7 @@ class Study(StudyTables):
                         raise invalid(f"{name!r} is a row of a table and no number", remedy)
             if goal.of is not None and goal.of != self.objective:
                 if why := self._not_recorded(goal.of):
-                    remedy = (
-                        f"Make it study.objective, and name {self.objective!r} here in its place"
-                    )
+                    remedy = f"Make it study.objective, and name {self.objective!r} here instead"
                     raise invalid(why, remedy, f"{key}.of", goal.of)
                 goal.placed(2 + self.further.index(goal.of))
             if goal.statistic == "cost":

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hpcclear.ensemble.session import describe_variables
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -101,12 +102,7 @@ class StudyRun:
         """Write a result file, called after its kind unless it has a name, with what made it; `attributes` where that differs
         from the study's."""
         content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
-        for variable in self.study.variables:
-            own = content.get(variable.name)
-            if own is not None and variable.rows:
-                own.attrs["options"] = "; ".join(row.name for row in variable.rows)
-            if own is not None and variable.silent:
-                own.attrs["of_random_inputs"] = ", ".join(variable.input_paths)
+        describe_variables(content, self.study)
         file = self.directory / (name or f"{content.attrs['hpcclear_kind']}.nc")
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, file)

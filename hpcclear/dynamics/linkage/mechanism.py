@@ -188,10 +188,8 @@ def _idle(m: Mechanism) -> None:
                 continue
             ends = {parts.split(place)[0], parts.split(getattr(load, other, GROUND))[0]}
             if any(ends <= group for group in joined(m, kinds)):
-                reason = "a load that acts here moves nothing"
-                raise InputError(
-                    f"loads.{load.name}.{entry}", place, reason, "Name a body that moves"
-                )
+                reason, remedy = "a load that acts here moves nothing", "Name a body that moves"
+                raise InputError(f"loads.{load.name}.{entry}", place, reason, remedy)
 
 
 def coupled(m: Mechanism) -> list[set[str]]:
