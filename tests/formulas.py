@@ -79,35 +79,15 @@ def formula(
     return f"({text} {sign} {other})", lambda given: _TWO[sign](value(given), second(given))
 
 
+ODD = ("**", "*", "/", "(", ")", "9", ".", "e9", ",", "<", " if ", " else ", "%", "-", "d", "", "", "²", "~", "^")  # fmt: skip
+
+
 def mutated(rng: random.Random, text: str) -> str:
     """A text with some characters dropped, doubled or replaced."""
     made = list(text)
     for _ in range(rng.randint(1, 4)):
         place = rng.randrange(len(made) + 1)
-        what = rng.choice(
-            (
-                "**",
-                "*",
-                "/",
-                "(",
-                ")",
-                "9",
-                ".",
-                "e9",
-                ",",
-                "<",
-                " if ",
-                " else ",
-                "%",
-                "-",
-                "d",
-                "",
-                "",
-                "²",
-                "~",
-                "^",
-            )
-        )
+        what = rng.choice(ODD)
         made[place : place + rng.randint(0, 2)] = [what]
     return "".join(made)
 

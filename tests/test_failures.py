@@ -11,6 +11,9 @@ from hpcclear.cli.check import lines
 from hpcclear.dynamics import evaluation
 from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.report.failures import SampledVariable, explained, where
+from hpcclear.report.figures import labels
+from hpcclear.report.html.designs import _cell
+from hpcclear.results.content import Results, Variable
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -143,3 +146,9 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
     assert told["corners"] == "4 (all corners): 2 can be assembled and complete two revolutions"
     assert told["failed"].startswith(f"1 of 4 corners stalled: {Status.STALLED.message}")
     assert told["failed"].endswith(Status.STALLED.remedy)
+
+
+def test_a_percentile_without_one_end_has_no_half_width():
+    ends = {"p": 13e-3, "p_lower": 12e-3, "p_upper": np.nan}
+    one = Results({k: Variable((), np.array(v), {"units": "m"}) for k, v in ends.items()})
+    assert _cell(one["p"], one, labels.of(one["p"])) == "13, interval not stated"

@@ -15,6 +15,6 @@ def plain(text: str) -> str:
     return text.translate({ord(o): o.encode("unicode_escape").decode() for o in commands})
 
 
-def counted(number: int, noun: str) -> str:
+def counted(number: int, noun: str, plural: str = "") -> str:
     """Return a number of things in words: "1 row", "2 rows"."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"

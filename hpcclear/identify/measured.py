@@ -7,6 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
+from hpcclear.base.remarks import remark
 from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
 from hpcclear.results.signals import is_counted
@@ -26,6 +27,8 @@ DRIFT = 0.03
 
 FAR = 0.1
 """The same from which on a table is not of the scene's machine, or its times are wrong."""
+
+ALIKE = "Sort its rows, and keep one of those that are alike"
 
 PAIRS = 180
 """Pairs of the curve of a measured pressure."""
@@ -63,7 +66,7 @@ def read_measured(
     seconds = None if time is None else sheet.si(time, "s", "heading")
     count = is_counted(name)
     if seconds is not None and (np.diff(seconds) <= 0.0).any():
-        raise InputError(key, str(path), "its times do not rise", "Sort its rows")
+        raise InputError(key, str(path), "its times do not rise", ALIKE)
     if angle is not None:
         place = unwrapped(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
     elif seconds is not None:
@@ -73,7 +76,8 @@ def read_measured(
         remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
         raise InputError(key, str(path), "has neither time nor crank angle", remedy)
     if (np.diff(place) <= 0.0).any():
-        raise InputError(key, str(path), "its time or angle does not rise", "Sort its rows")
+        remedy = f"{ALIKE}. If its angle falls, reverse the speed of the scene's drive"
+        raise InputError(key, str(path), "its time or angle does not rise", remedy)
     if not np.isfinite(values).all():
         raise InputError(key, str(path), "has cells without a number", "Remove these rows")
     found = harmonics(place, values, count) if place[-1] - place[0] >= 1.0 else np.empty((0, 1))
@@ -152,4 +156,8 @@ def _frequency(time: Array, values: Array, nominal: float) -> float:
     step = 1.0 / (4.0 * span * len(orders))
     count = int(DRIFT * nominal / step)
     best = max((nominal + step * np.arange(-count, count + 1)).tolist(), key=power)
+    if abs(best - nominal) > DRIFT * nominal - step:
+        remark(
+            f"Warning: its revolutions are most alike {100 * DRIFT:g} % or more from the scene's speed"
+        )
     return float(max((best + step * np.linspace(-1.0, 1.0, 41)).tolist(), key=power))

@@ -12,6 +12,8 @@ from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
+from hpcclear.base.plain import counted
+from hpcclear.base.remarks import remark
 from hpcclear.report.figures import motion
 from hpcclear.results.content import Results
 from hpcclear.results.signals import signal
@@ -23,6 +25,9 @@ ORDERS = 64
 
 INSTANTS = 1024
 """Instants of a revolution: simulated contact forces have content beyond the highest harmonic, which must not alias into it."""
+
+GAP = 0.05
+"""Share of a revolution between two rows beyond which it is left out, unless rows are as sparse elsewhere."""
 
 PARTS = 3
 """Numbers kept of a harmonic: real and imaginary part of its mean over revolutions, variance between revolutions."""
@@ -91,8 +96,8 @@ def names_of(response: Results) -> list[str]:
 
 
 def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
-    """Complex harmonics (revolutions, ORDERS + 1) of each whole revolution; order k > 0 with the amplitude of its cosine and
-    sine.
+    """Complex harmonics (revolutions, ORDERS + 1) of each whole revolution without a gap; order k > 0 with the amplitude of its
+    cosine and sine.
 
     `turns` (t,): revolutions of the crank, rising; whole numbers are at angle 0. `count`: the values (t,) are events.
     """
@@ -106,7 +111,12 @@ def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
         grid = make_interp_spline(turns, values, k=3)(np.clip(places, turns[0], turns[-1]))
     found = np.fft.rfft(grid.reshape(-1, INSTANTS), axis=1)[:, : ORDERS + 1] / INSTANTS
     found[:, 1:] *= 2.0
-    return np.asarray(found)
+    wide = np.diff(turns) > (np.inf if count else max(GAP, 2.0 * slack))
+    number = np.arange(first, last)[:, None]
+    holed = ((turns[:-1][wide] < number + 1) & (turns[1:][wide] > number)).any(axis=1)
+    if holed.any():  # a curve through the ends of a gap is not what was measured
+        remark(f"Note: {counted(int(holed.sum()), 'revolution')} with gaps left out")
+    return np.asarray(found[~holed])
 
 
 def revolutions_of(scene: Scene, response: Results) -> Array:

@@ -251,9 +251,7 @@ class RandomInput(NamedInput):
         if "values" in row:
             row["values"] = tuple(sorted(offset.several(row["values"], "values", 2, LONGEST_CURVE)))
             if row["values"][0] == row["values"][-1]:
-                raise invalid(
-                    "all values are the same", "Remove the input, or give others", "values"
-                )
+                raise invalid("all values are the same", "Remove it, or give others", "values")
         return row
 
     def _check(self) -> None:

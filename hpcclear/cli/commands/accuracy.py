@@ -13,9 +13,7 @@ from hpcclear.cli import loaded, options as cli
 @cli.flag("--quick", "Measure with fewer points, in about a minute.")
 @cli.FRESH
 @cli.LIMIT
-@cli.flag(
-    "--plan", "Estimate core-hours and wall time of a run instead, and print its Slurm options."
-)
+@cli.flag("--plan", "Estimate core-hours and wall time of a run instead, with Slurm options.")
 @cli.option(
     "--error RELATIVE",
     "With --plan, target error of the objective, relative. By default the settings of the file are used.",

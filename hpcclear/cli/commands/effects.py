@@ -23,9 +23,7 @@ from hpcclear.cli import loaded, options as cli
 @cli.flag(
     "--forces", "Apply the tolerance to peak contact forces too. Without it they are only reported."
 )
-@cli.option(
-    "--scene FILE", "Write the recommended scene to this file.", name="reduced", type=cli.PATH
-)
+@cli.option("--scene FILE", "File for the recommended scene.", name="reduced", type=cli.PATH)
 @cli.with_how
 def run(
     written: cli.Written,

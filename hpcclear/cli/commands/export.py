@@ -21,9 +21,7 @@ from hpcclear.cli import options as cli
 @cli.flag(
     "--statistics", "Write statistics of samples instead: for each file columns of value and interval."
 )  # fmt: skip
-@cli.option(
-    "--beyond NAME=VALUE", "With --statistics, share of samples beyond this value. Repeatable."
-)
+@cli.option("--beyond NAME=VALUE", "With --statistics, share of samples beyond it. Repeatable.")
 def run(
     files: tuple[Path, ...],
     output: Path,

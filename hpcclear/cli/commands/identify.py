@@ -29,9 +29,7 @@ from hpcclear.ranks.stopping import Exit
     "--gain-error SHARE", "Standard deviation of the sensor's calibration factor, relative.",
     type=cli.Amount(min=0.0), default=0.0,
 )  # fmt: skip
-@cli.option(
-    "--angle-error ANGLE", "Standard deviation of the crank-angle reference.", default="0 deg"
-)
+@cli.option("--angle-error ANGLE", "Standard deviation of the angle reference.", default="0 deg")
 @cli.option(
     "--noise SHARE", type=cli.Amount(min=0.0, min_open=True),
     words="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "

@@ -10,9 +10,7 @@ from hpcclear.cli import loaded, options as cli
 @cli.command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@cli.option(
-    "--x PATH=LO:HI:N", "First parameter: scene entry, bounds, number of cells.", required=True
-)
+@cli.option("--x PATH=LO:HI:N", "First parameter: entry, bounds, number of cells.", required=True)
 @cli.option("--y PATH=LO:HI:N", "Second parameter.")
 @cli.flag(
     "--bifurcation", "Observe one value of each revolution instead, for a bifurcation diagram."
@@ -22,15 +20,9 @@ from hpcclear.cli import loaded, options as cli
     words='With --bifurcation, series of a response, taken at the section: "contact_force crank_rod". With max, min or mean '
           'before it, that value of each revolution: "max contact_force crank_rod".',
 )  # fmt: skip
-@cli.option(
-    "--section ANGLE", "Crank angle at which the series is taken, in rad or with a unit.", "0 deg"
-)
-@cli.option(
-    "--transient", "Revolutions before the first one that is observed.", 60, type=click.IntRange(0)
-)
-@cli.option(
-    "--revolutions", "Revolutions that are observed.", 60, type=click.IntRange(1, 1_000_000)
-)
+@cli.option("--section ANGLE", "Crank angle of the section, in rad or with a unit.", "0 deg")
+@cli.option("--transient", "Revolutions before the first observed one.", 60, type=click.IntRange(0))
+@cli.option("--revolutions", "Observed revolutions.", 60, type=click.IntRange(1, 1_000_000))
 @cli.with_how
 def run(
     written: cli.Written,

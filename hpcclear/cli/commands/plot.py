@@ -24,9 +24,7 @@ KINDS = ("png", "svg", "pdf")
     "--figure NAME", "Figure to draw. Repeatable. Default: all. Without -o the names are listed.",
     name="names",
 )  # fmt: skip
-@cli.option(
-    "-o --output", "File for one figure (png, svg, pdf), otherwise a directory.", type=cli.PATH
-)
+@cli.option("-o --output", "File of one figure (png, svg, pdf), or a directory.", type=cli.PATH)
 @cli.option(
     "--format", "Format of figures in a directory.", "png",
     type=click.Choice(KINDS), name="kind",

@@ -10,13 +10,9 @@ from hpcclear.ranks.stopping import Exit
 
 @cli.command("keep", "Repeat simulations bit by bit; describe results for an archive.")
 @click.argument("place", type=cli.PATH)
-@cli.option(
-    "--samples", "Number of samples to repeat of each file.", 16, type=click.IntRange(min=1)
-)
+@cli.option("--samples", "Samples to repeat of each file.", 16, type=click.IntRange(min=1))
 @cli.TRUST
-@cli.flag(
-    "--crate", "Describe a directory of results for an archive instead, as a Process Run Crate."
-)
+@cli.flag("--crate", "Describe results for an archive instead, as a Process Run Crate.")
 def run(place: Path, samples: int, trust: bool, crate: bool) -> int:
     """Repeat some simulations of a result from the scene in its file, and compare bit by bit.
 

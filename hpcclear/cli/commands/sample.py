@@ -9,7 +9,7 @@ from hpcclear.cli import loaded, options as cli
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
 @cli.option(
-    "--points", "CSV table of designs, used instead of the designs of the study.", type=cli.PATH
+    "--points", "Table of designs (CSV, xlsx) instead of those of the study.", type=cli.PATH
 )
 @cli.flag(
     "--statistics",

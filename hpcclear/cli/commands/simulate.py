@@ -11,9 +11,7 @@ from hpcclear.ranks.stopping import Exit
 @cli.command("compute", "Simulate one design.")
 @cli.with_scene
 @cli.output_option("NetCDF file to write.")
-@cli.option(
-    "--keep N", "Store the time series of the last N revolutions only.", type=click.IntRange(1)
-)
+@cli.option("--keep N", "Store the series of the last N revolutions only.", type=click.IntRange(1))
 def run(written: cli.Written, output: Path, keep: int | None) -> int:
     """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
 

@@ -140,8 +140,10 @@ def _cell(own: Variable, one: Results, scale: labels.Scale) -> str:
     if labels.options(own) and np.isfinite(own):
         return labels.value(own)
     value, low, high = np.array(labels.estimate(one, own.name.removesuffix("_true"))) * scale.factor
-    known = np.isfinite([value, low]).all()
-    return Number(labels.paired(value, (high - low) / 2)) if known else number(value)
+    if np.isfinite([value, low, high]).all():
+        return Number(labels.paired(value, (high - low) / 2))
+    open_ = np.isfinite(low) or np.isfinite(high)  # too few samples for one end
+    return f"{number(value)}, interval not stated" if open_ else number(value)
 
 
 PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs, "verification"),)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcclear.base.plain import counted
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import identified, targets
 from hpcclear.report.figures import effects as screening, labels
@@ -93,7 +94,7 @@ def _screened(found: Results) -> Iterator[Trust]:
     else:
         yield green("Every variant is decided", "effects")
     if failed := int(np.sum(found["failed"].values)):
-        yield amber(f"{failed} simulations failed", "effects")
+        yield amber(f"{counted(failed, 'simulation')} failed", "effects")
     level = f"{100 * float(found.attrs['confidence']):.0f} %"
     yield green(f"Intervals of {level}, from averages over the same points", "effects")
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.plain import counted
 from hpcclear.report.figures.labels import between, quantity, stated
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import PageTable
@@ -26,6 +27,7 @@ from hpcclear.results.content import Results, texts_in
 from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
 
 HOUR = 3600.0
+LIVES = ("service life", "service lives")
 
 REASONS = {
     "cycles": "after wear.cycles, no limit reached",
@@ -125,7 +127,7 @@ def _trust(lives: Results) -> Iterator[Trust]:
         text = f"{open_} of {count} lives reached no limit: raise wear.cycles for their length"
         yield amber(text, "lives")
     if count < (least := fewest(0.05)):
-        text = f"{count} lives do not bound the 5th percentile from below; {least} would"
+        text = f"the 5th percentile has no lower bound from {counted(count, *LIVES)}; {least} would give one"
         yield amber(f"{text} (wear.lives)", "lives")
 
 
@@ -142,14 +144,13 @@ def _failed(lives: Results) -> list[str]:
 def doubts(content: Results) -> Iterator[str]:
     """Yield warnings on service lives, a sentence each: scatter of wear rates, motion before its steady state, grooves."""
     if unsure := int((content["flags"].values == Flag.TARGET_MISSED).sum()):
-        yield f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
+        yield f"in {counted(unsure, *LIVES)} wear rate or f scatters more than wear.tolerance; see clearance_limit"
     drift = content["drift"].values
     if moving := int((drift > content.attrs["tolerance"]).sum()):
-        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
         change = f"{100 * drift.max():.1f} % change with a longer transient"
-        yield f"{count} had not reached steady state ({change}); raise numerics.transient_revolutions"
+        yield f"{counted(moving, *LIVES)} had not reached steady state ({change}); raise numerics.transient_revolutions"
     if "sharpest" in content and (narrow := int((content["sharpest"].values > 1.0).sum())):
-        text = f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges"
+        text = f"in {counted(narrow, *LIVES)} a groove is worn narrower than the journal, which would touch both of its edges"
         yield f"{text}; lower wear.harmonics"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Status
+from hpcclear.base.plain import counted
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import alike, answer, bearings, scatter
 from hpcclear.report.answer import FAR, MANY, beyond_hertz
@@ -259,7 +260,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
         yield amber(f"Sobol indices ± {100 * half:.0f} %: ranking only", place)
     kinds = ("sensitivity", "kriging")
     if poor := sum(len(fits.warnings(kind, of.files.get(kind))) for kind in kinds):
-        yield amber(f"{poor} surrogate fits are poor", place)
+        yield amber(f"Poor fit of {counted(poor, 'surrogate')}", place)
 
 
 def _accuracy(best: Results) -> Trust:
