@@ -9,6 +9,7 @@ from margins import at_most
 from scipy import stats
 
 from hpcclear.base.errors import InputError
+from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.points import latin_hypercube, read_points
@@ -171,6 +172,16 @@ def test_table_of_designs(tmp_path: Path) -> None:
     expected = [[0.2, 3e-4, 0.14, ROBUST.number("drive.speed")], [0.3, 6e-4, 0.15, 100 * np.pi]]
     np.testing.assert_allclose(points.values, expected, rtol=2e-16)
     assert points.paths[1] == ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
+
+
+def test_a_table_that_was_exported_gives_its_designs_again(tmp_path: Path) -> None:
+    text = "sample,m2 [g],C [mm],objective [mm],peak_contact_force crank_rod [N],status,label\n"
+    place = _table(tmp_path, text + "0,210,0.3,0.2,9000,ok,new\n1,200,0.3,,,stalled,old\n")
+    points = read_points(place, ROBUST, KINDS["samples"].table)
+    assert (points.names, points.labels) == (("m2", "C"), ("new", "old"))
+    study = load_scene(JOBS / "tolerances.toml")
+    with pytest.raises(InputError, match="is a choice of the study"):
+        read_points(_table(tmp_path, "m2 [g],rod\n210,steel"), study)
 
 
 def test_table_needs_no_study_and_drives_the_clearances_there_are(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ from hpcclear.results import dataset, files
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, discard
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key, key_attribute
+from hpcclear.results.names import KINDS
 from hpcclear.results.places import Place
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
@@ -253,8 +254,8 @@ def sample_points(
     task = Task(stage, maker or simulate.make_evaluator, payload, record)
     if checkpoint is None:
         return leading.run_points(ranks, task, sent.values, progress=progress)
-    completed = recast(checkpoint.completed(first, len(points)), record)
-    completed["sample"] -= first
+    before = recast(checkpoint.completed(first, len(points)), record)
+    before["sample"] -= first
 
     def take(records: np.ndarray) -> None:
         numbered = records.copy()
@@ -265,9 +266,7 @@ def sample_points(
         with ranks.stage(stage), ranks.writing():
             checkpoint.flush()
 
-    run = partial(
-        leading.run_points, ranks, task, sent.values, completed=completed, on_records=take
-    )
+    run = partial(leading.run_points, ranks, task, sent.values, completed=before, on_records=take)
     with saving(save):
         return run(save=checkpoint.flush_when_due, progress=progress)
 
@@ -287,7 +286,7 @@ def design(scene: Scene, table: Path | None) -> Points:
     Raises InputError if there is neither, or a point makes no mechanism.
     """
     if table is not None:
-        return read_points(table, scene)
+        return read_points(table, scene, KINDS["samples"].table)
     if (method := scene.required_study.method) == "lhs":
         points = latin_hypercube(scene)
     else:

@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Empirical
+from hpcclear.base.remarks import remark
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.named import SHORT_NAMES
@@ -245,13 +246,11 @@ def count_of(study: Study, samples: int | None, first: int = 0) -> int:
     return count
 
 
-LABELS = (
-    "design", "name", "label", "part", "id", "no", "no.", "nr", "nr.", "number", "index", "run", "#",
-)  # fmt: skip
+LABELS = ("design", "name", "label", "part", "id", "no", "no.", "nr", "nr.", "number", "index", "run", "#")  # fmt: skip
 """Headings, in small letters, of columns that name the rows."""
 
 
-def read_points(path: str | Path, scene: Scene) -> Points:
+def read_points(path: str | Path, scene: Scene, results: Collection[str] = ()) -> Points:
     """A user's table of designs: a CSV file of any spreadsheet program, or an Excel workbook.
 
     The first row names the columns: study variables, short names (m2, C, ...), or dotted
@@ -264,6 +263,8 @@ def read_points(path: str | Path, scene: Scene) -> Points:
         The file.
     scene : Scene
         What the columns change; a study is not needed.
+    results : collection of str
+        Columns to leave out: those of results, in a table that `export` wrote.
 
     Returns
     -------
@@ -275,7 +276,10 @@ def read_points(path: str | Path, scene: Scene) -> Points:
     from hpcclear.scene.sheets import read  # with the readers of all kinds of files
 
     key, sheet = str(path), read(Path(path))
-    driven = [(column, _driven(column, scene, key, sheet)) for column in sheet.columns]
+    made = {one for one in sheet.columns if one.name.split(" ")[0] in {*results} - {*LABELS}}
+    if made:
+        remark(f"Note: the results in {path} are left out")
+    driven = [(one, _driven(one, scene, key, sheet)) for one in sheet.columns if one not in made]
     labels = [column for column, paths in driven if not paths]
     columns = [column for column, paths in driven if paths]
     if not columns:
@@ -306,6 +310,9 @@ def _driven(column: "SheetColumn", scene: Scene, key: str, sheet: "Sheet") -> tu
     """Entries that a column such as ``C [mm]`` drives, none if it names the rows."""
     paths = entries_of(scene, column.name)
     if not paths:
+        if scene.study is not None and column.name in scene.study.names:
+            reason = "is a choice of the study, by rows or of random inputs"
+            raise InputError(key, column.name, reason, "Give the numbers of the scene that it sets")
         of_scene = any(column.name.startswith(f"{table}.") for table in Scene.model_fields)
         if column.name.lower() in LABELS or (sheet.is_text(column) and not of_scene):
             return ()

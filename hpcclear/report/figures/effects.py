@@ -106,9 +106,7 @@ def statements(content: Results, seconds: Times) -> list[str]:
     last = f"No effect can be neglected within {tolerance}."
     if chosen:
         names, saved = ", ".join(named(content, chosen)), saving(content, chosen, seconds).words
-        last = (
-            f"Within {tolerance} these effects can be neglected: {names}. Run time saved: {saved}."
-        )
+        last = f"Within {tolerance} these effects can be neglected: {names}. Time saved: {saved}."
     doubts = (undecided(content, k) for k in singles)
     return [*filter(None, doubts), *distinguished(content), last]
 
