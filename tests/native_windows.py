@@ -25,17 +25,8 @@ LIBRARIES = (
 )  # fmt: skip
 """Loaded before: they choose their own code for Windows by the name of the system, which is not changed here."""
 SIGNALS = (
-    "SIGUSR1",
-    "SIGUSR2",
-    "SIGALRM",
-    "SIGPROF",
-    "SIGHUP",
-    "SIGKILL",
-    "setitimer",
-    "ITIMER_PROF",
-    "ITIMER_REAL",
-    "alarm",
-)
+    "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGPROF", "SIGHUP", "SIGKILL", "setitimer", "ITIMER_PROF", "ITIMER_REAL", "alarm",
+)  # fmt: skip
 
 WORKS = (
     "init", "check", "simulate", "sample", "report", "reproduce", "reproduce --crate", "show", "export", "compare", "plot",
