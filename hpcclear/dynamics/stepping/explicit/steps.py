@@ -18,7 +18,7 @@ from hpcclear.dynamics.stepping.control import coordinate, count_up, measure, pl
 from hpcclear.dynamics.stepping.explicit import tableau as tab
 from hpcclear.dynamics.stepping.explicit.combine import Step, any_stage_state, stage_row, step_error
 
-CALM_STEPS = 6.0  # so many in a row send a lane back
+CALM_STEPS = 7.0  # so many in a row send a lane back
 EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffness
 CHATTER = 4.0  # or that times the change over the step between its last two stages: as good a sign
 EDGE_LIMIT = 40.0  # such a score sends a lane to the implicit method

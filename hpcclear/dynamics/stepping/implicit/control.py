@@ -24,7 +24,7 @@ FAILED_SHRINK = 0.1  # at most, after the iteration failed
 CEILING, CEILING_GROWTH = 0.6, 1.05
 """Of the failed step, for those after it; and how that is forgotten, step by step."""
 
-CALM_STIFFNESS, CALM_GROWTH = 2.0, 1.1
+CALM_STIFFNESS, CALM_GROWTH = 2.0, 1.25
 """h |J| below which the explicit method would do; and growth of a step above which not: what that stirred up dies away."""
 
 STEEP = 100.0
