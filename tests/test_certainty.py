@@ -239,6 +239,24 @@ def test_a_design_is_decided_before_a_verification_ends(monkeypatch):
     assert max(chances) == 1.0
 
 
+QUANTILE = {"statistic": "quantile", "level": 0.9, "most": 1.0}
+RARE = {"statistic": "exceedance", "limit": 1.0, "most": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("bounds", "lengths"),
+    [([], [8, 16, 24, 32, 48]), ([QUANTILE], [8, 16, 32, 64, 128]), ([RARE], [8, 16, 24, 32, 48])],
+)
+def test_designs_grow_by_half_unless_each_look_decides(bounds, lengths):
+    case = {"random": ["C"], "objectives": ["mean"], "constraints": bounds}
+    scene = load_scene(ROBUST).with_({"study.cases": {"one": case}})
+    run, found = SimpleNamespace(study=scene.required_study), lengths[:1]
+    for _ in lengths[1:]:
+        values = np.empty((2, 16, found[-1]))
+        found.append(contest.longer(run, Choice("", "one", {}), values))
+    assert found == lengths
+
+
 def test_a_design_of_which_little_is_known_is_not_called_as_good():
     """The second is 3 % worse and lighter; its few simulations do not show that it is worse."""
     values = np.array([[1.00, 2.0], [1.03, 1.0]])
