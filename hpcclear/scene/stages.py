@@ -228,7 +228,7 @@ class Verification(Table):
             remedy = 'Set study.accuracy or most_samples, or write method = "monte-carlo"'
             raise invalid("a Sobol sequence's size follows from the accuracy", remedy, "samples")
         if (self.least_samples or 0) > self.most_samples:
-            raise invalid("exceeds most_samples", "Lower it or raise most_samples", "least_samples")
+            raise invalid("is more than most_samples", "Lower it, or raise that", "least_samples")
 
     @property
     def draws(self) -> int | None:

@@ -32,7 +32,7 @@ class TorsionSpringLoad(Load):
 
     def _check(self) -> None:
         if "angle" in self.model_fields_set and "stiffness" not in self.model_fields_set:
-            raise invalid("the spring has no stiffness", "Give stiffness, or remove it", "angle")
+            raise invalid("is of a spring without stiffness", "Add stiffness or remove it", "angle")
         stops = self.lower is not None or self.upper is not None
         if stops != (self.stop_stiffness > 0.0):
             remedy = "Give lower or upper, and stop_stiffness above 0"
