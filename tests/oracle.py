@@ -37,12 +37,8 @@ class Joint:
     """Friction over normal force of the sliding speed, in place of Coulomb's."""
 
     def forces(
-        self,
-        journal: complex,
-        bearing: complex,
-        speeds: tuple[complex, complex],
-        spins: tuple[float, float],
-    ):
+        self, journal: complex, bearing: complex, speeds: tuple[complex, complex], spins: tuple[float, float]
+    ):  # fmt: skip
         """Force on the journal, and the point where it acts; the bearing feels the opposite there."""
         e = journal - bearing
         distance = abs(e)

@@ -18,12 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from hpcclear.base.asking import answered
 from hpcclear.base.verdict import Verdict
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.ensemble.certificate import (
-    Certificate,
-    Screening,
-    VariantResult,
-    certificate,
-)
+from hpcclear.ensemble.certificate import Certificate, Screening, VariantResult, certificate
 from hpcclear.ensemble.trial import Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures.effects import label, named, saving, seconds_of, statements

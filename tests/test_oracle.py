@@ -19,12 +19,8 @@ SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 
 
 def scene_of(
-    contact: dict,
-    clearance: float,
-    friction: float,
-    rtol: float = 1e-6,
-    revolutions: tuple[int, int] = (3, 3),
-) -> Scene:
+    contact: dict, clearance: float, friction: float, rtol: float = 1e-6, revolutions: tuple[int, int] = (3, 3)
+) -> Scene:  # fmt: skip
     """The paper's mechanism, both clearances alike."""
     return load_scene(SCENE).with_(
         {

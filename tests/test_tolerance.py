@@ -11,6 +11,7 @@ import pytest
 from formula_study import contents, formula, on_ranks
 from refusals import refused
 
+from hpcclear.base.outcome import Status
 from hpcclear.ensemble.session import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
@@ -116,6 +117,7 @@ def test_quantiles_and_probabilities_move_as_f_moved_and_stretched(shift):
 def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():
     tight, left = tolerance.stricter(scene_of("numerics.atol=1e-7"))
     assert (tight.numerics.rtol, tight.numerics.atol) == pytest.approx((1e-6, 1e-9))
+    assert tight.numerics.max_steps == 10 * scene_of().numerics.max_steps
     assert left == pytest.approx(0.25)
     tight, left = tolerance.stricter(scene_of("numerics.rtol=1e-13"))
     assert tight.numerics.rtol == pytest.approx(1e-14)
@@ -201,6 +203,19 @@ def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeyp
     # 1.3 % of 0.25 % by halves
     assert "Lower numerics.rtol, to 1e-07 say" in found.attrs["remarks"]
     assert (found["mean_within"] > 0.01).all()
+
+
+def test_numbers_are_unknown_where_their_simulations_all_fail(tmp_path, monkeypatch):
+    def failing(*arguments, **named):
+        records = sample_points(*arguments, **named)
+        if named["stage"].startswith(("pairs", "chaos", "worst")):
+            records["status"], records["objective"] = Status.STEP_CAP, np.nan
+        return records
+
+    monkeypatch.setattr(simulations, "sample_points", failing)
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
+    error = opened.read(tmp_path / "it" / "verification.nc")["mean_tolerance_error"]
+    assert (error.values > 0.0).all()
 
 
 def test_each_design_has_its_own_share(tmp_path, monkeypatch):

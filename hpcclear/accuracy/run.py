@@ -178,13 +178,8 @@ FILE = "accuracy.nc"
 
 
 def run_accuracy(
-    scene: Scene,
-    directory: Path,
-    ranks: Ranks,
-    profile: Profile,
-    notify: Notify,
-    options: Options = Options(),
-) -> tuple[Results, dict[str, Path]]:
+    scene: Scene, directory: Path, ranks: Ranks, profile: Profile, notify: Notify, options: Options = Options()
+) -> tuple[Results, dict[str, Path]]:  # fmt: skip
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 
     Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from

@@ -76,12 +76,8 @@ class StudyRun:
         return self._kept(name, nullcontext(), work, arguments)
 
     def _kept(
-        self,
-        name: str,
-        context: AbstractContextManager[None],
-        work: Work,
-        arguments: tuple[object, ...],
-    ) -> Result:
+        self, name: str, context: AbstractContextManager[None], work: Work, arguments: tuple[object, ...]
+    ) -> Result:  # fmt: skip
         found = self.checkpoint.load_stage(name)
         count = 0 if found is None else int(found["next_sample"])
         # a file of the samples that a kept stage stands on may be damaged

@@ -58,6 +58,9 @@ def combined(records: Records, responses: Array, loads: StudyVariable) -> tuple[
 SHOWN = {"pairs": "runs at two tolerances", "chaos": "perturbed runs"}
 """Names of stages on the progress display, where the stage has another one."""
 
+SPARED = ("search", "pairs", "chaos", "worst")
+"""Stages that all simulations may fail of: the first then looks elsewhere, the others leave a number unknown."""
+
 
 class Simulations:
     """Simulates batches of designs of a scene with a study, numbered one after the other through the whole study.
@@ -144,7 +147,7 @@ class Simulations:
             self._checkpoint.flush_when_due()
         self.next += len(points)
         failed = len(records) > 0 and not (records["status"] == Status.OK).any()
-        if failed and stage != "search":  # which then looks elsewhere
+        if failed and stage not in SPARED:
             codes, counts = np.unique(records["status"], return_counts=True)
             worst = Status(int(codes[counts.argmax()]))
             reason = f"all of these simulations failed, most often because {worst.message}"

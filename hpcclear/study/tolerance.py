@@ -32,8 +32,8 @@ from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.simulations import loads_of
 
-STRICTER, STRICTEST = 100.0, 1e-14
-"""By how much the tolerance of pairs is stricter, and how strict it may be."""
+STRICTER, STRICTEST, STEPS = 100.0, 1e-14, 10
+"""By how much the tolerance of pairs is stricter, how strict it may be, and how many times the steps a sample then has."""
 
 FALL = 0.5
 """What a tolerance ten times stricter leaves of a bias. Medians of 80 designs are 0.8 from 1e-3 to 1e-4, where contacts and
@@ -103,6 +103,7 @@ def _first(length: int, designs: int, most: float) -> int:
 def stricter(scene: Scene) -> tuple[Scene, float]:
     """The scene that pairs are simulated by, and what share of a bias is left there."""
     numerics = scene.numerics
+    scene = scene.with_({"numerics.max_steps": STEPS * numerics.max_steps})
     if numerics.target_error is not None:
         return scene.with_({"numerics.target_error": 0.5 * numerics.target_error}), 0.5
     rtol = max(numerics.rtol / STRICTER, STRICTEST)
@@ -242,7 +243,8 @@ def _known(
         for place in np.ndindex(bias.shape[1:]):
             at = (rows, *place)
             bias[at], error[at] = together(bias[at], error[at], _typical(scene)[place[-1]])
-    return Taken(np.nan_to_num(bias), np.nan_to_num(error), strict[0].shape[1] - 1)
+    error = np.where(np.isfinite(error), error, _typical(scene))  # no pair shows it
+    return Taken(np.nan_to_num(bias), error, strict[0].shape[1] - 1)
 
 
 def _typical(scene: Scene) -> tuple[float, float]:

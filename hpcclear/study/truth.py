@@ -111,13 +111,8 @@ def expected(study: Study) -> int:
 
 
 def lengthen(
-    run: StudyRun,
-    choices: Sequence[Choice],
-    made: list[Array],
-    rows: Sequence[int],
-    stage: str,
-    length: int,
-) -> None:
+    run: StudyRun, choices: Sequence[Choice], made: list[Array], rows: Sequence[int], stage: str, length: int
+) -> None:  # fmt: skip
     """So many points more of each replicate of some designs that are equally long; `made` as `made` returns it."""
     fresh = drawn(run, [choices[k] for k in rows], stage, length, made[rows[0]].shape[2])
     for k, one in zip(rows, fresh, strict=True):

@@ -133,13 +133,8 @@ class Verified(NamedTuple):
 
 
 def _name_case(
-    run: StudyRun,
-    case: Case,
-    rows: Sequence[int],
-    choices: Sequence[Choice],
-    true: Result,
-    table: NamedDesigns,
-) -> None:
+    run: StudyRun, case: Case, rows: Sequence[int], choices: Sequence[Choice], true: Result, table: NamedDesigns
+) -> None:  # fmt: skip
     count, kept = len(case.goals), case.kept
     values = true["goal"][rows, :count]
     shifts = np.moveaxis(true["goal_shifts"][rows, :count], 1, 0)
