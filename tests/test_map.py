@@ -110,11 +110,12 @@ def test_what_is_no_grid_is_refused(axes):
 
 def test_a_map_folds_back_into_a_grid(tmp_path):
     out = tmp_path / "map.nc"
-    result = CliRunner().invoke(
-        cli, words(out, "C=0.2mm:0.95mm:2", "m3=0.1:0.2:3"), standalone_mode=False
-    )
+    given = words(out, "C=0.2mm:0.95mm:2", "m3=0.1:0.2:3")
+    result = CliRunner().invoke(cli, given, standalone_mode=False)
     assert result.exit_code == 0, result.output
     assert "6 cells over" in " ".join(result.output.split())
+    repeated = CliRunner().invoke(cli, ["reproduce", str(out)], standalone_mode=False)
+    assert "6 of 6 samples: the same" in repeated.output
     with xr.open_dataset(out) as content:
         assert content.attrs[SHAPE] == "2 3"
         folded = grid(content.load())
@@ -125,3 +126,13 @@ def test_a_map_folds_back_into_a_grid(tmp_path):
     content.attrs = {}
     with pytest.raises(InputError):
         grid(content)
+
+
+@pytest.mark.parametrize("more", [(), ("--bifurcation",)])
+def test_a_map_whose_cells_all_fail_says_why_and_is_a_file_like_others(tmp_path, more):
+    out = tmp_path / "map.nc"
+    given = [*words(out, "C=0.2mm:0.95mm:2"), "--set", "numerics.max_steps=100", *more]
+    for command in (given, ["plot", str(out)], ["reproduce", str(out)], ["report", str(tmp_path)]):
+        result = CliRunner().invoke(cli, command, standalone_mode=False)
+        assert (result.exception, result.return_value or 0) == (None, 0), result.output
+        assert command != given or "step_cap: numerics.max_steps" in result.output

@@ -65,8 +65,9 @@ class Observation:
         return replace(MEAN_GAP, name=self.name, unit=seen.unit, words=words)
 
     def __call__(self, scene: Scene, response: Results) -> Array:
-        """Values of revolutions, NaN of a failed simulation, and the flags of the response, (revolutions + 1,)."""
-        return np.append(self._seen(response), float(response["flags"]))
+        """Values of revolutions, NaN of a failed simulation, and flags and status of the response, (revolutions + 2,)."""
+        said = [float(response[name]) for name in ("flags", "status")]
+        return np.append(self._seen(response), said)
 
     def _seen(self, response: Results) -> Array:
         nothing = np.full(self.revolutions, np.nan)
@@ -109,13 +110,14 @@ def run_bifurcation(
         variants = [dict.fromkeys(points.paths[0], float(one)) for one in varied]
         long = scene.with_(changes)
         short = simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
-        asked = long, variants, observation, (count + 1,), ranks, "bifurcation"
-        *observed, flags = responses_of(*asked, checkpoint=session.opened(scene))[:, 0].T
+        asked = long, variants, observation, (count + 2,), ranks, "bifurcation"
+        *observed, flags, status = responses_of(*asked, checkpoint=session.opened(scene))[:, 0].T
         coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
         data = {
             points.names[0]: varied,
             "observed": np.transpose(observed),
             "flags": flags.astype(np.int8),
+            "status": status.astype(np.int8),
         }
         about = session.attributes, points.units, observation.described(short), points.words
         return session.write(dataset.dataset("bifurcation", coords, data, *about))

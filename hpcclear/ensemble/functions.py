@@ -34,13 +34,8 @@ def in_process(
 
 
 def map(
-    scene: Scene,
-    x: str,
-    y: str | None = None,
-    *,
-    output: str | Path | None = None,
-    progress: str = "auto",
-) -> xr.Dataset:
+    scene: Scene, x: str, y: str | None = None, *, output: str | Path | None = None, progress: str = "auto"
+) -> xr.Dataset:  # fmt: skip
     """Map periodic and chaotic motion over one or two entries of a scene.
 
     Parameters

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import Finished, Options, Session, sample_points, samples_of, saving
 from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.schedule import Worker
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE
@@ -22,9 +22,6 @@ from hpcclear.results.places import Place
 from hpcclear.scene import Scene
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.points import Points, check_apart, check_points
-
-if TYPE_CHECKING:
-    from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 
 
 def axis(scene: Scene, words: str, option: str = "--x") -> tuple[str, tuple[str, ...], np.ndarray]:
@@ -87,12 +84,11 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
     return points, grid[0].shape
 
 
-def make_mapper(payload: Payload, ranks: Ranks) -> "SteadyEvaluator":
+def make_mapper(payload: Payload, ranks: Ranks) -> Worker:
     """A rank's worker."""
-    from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
-    from hpcclear.dynamics.evaluation.steady.mapping import mapped
+    from hpcclear.dynamics.evaluation import evaluator_of
 
-    worker = SteadyEvaluator(payload.scene, payload.columns, payload.lanes, mapped)
+    worker = evaluator_of(payload.scene, payload.columns, payload.lanes, mapped=True)
     return first_compiled(worker, ranks)
 
 

@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points, evaluated
+from hpcclear.ensemble.session import samples_of
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
+from hpcclear.results.grids import SHAPE
 from hpcclear.results.provenance import program
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -78,7 +82,10 @@ def _samples(content: Results, scene: Scene) -> Results:
     values = {str(one.attrs.get("scene_path", one.name)): one.values for one in rows}
     names = tuple(one.name for one in rows)
     named = tuple(content["label"].values) if "label" in content else ()
-    return evaluated(scene, replace(as_points(scene, values), names=names, labels=named))
+    points = replace(as_points(scene, values), names=names, labels=named)
+    if SHAPE not in content.attrs:
+        return evaluated(scene, points)
+    return samples_of(scene, points, evaluate_records(scene, points, mapped=True), {}, MEAN_GAP)
 
 
 def _series(content: Results, scene: Scene) -> tuple[Results, Results]:

@@ -145,13 +145,8 @@ class States:
 
 
 def follow(
-    scene: Scene,
-    states: States,
-    ranks: Ranks,
-    checkpoint: Checkpoint,
-    style: Style = "quiet",
-    first: int = 0,
-) -> list[Life]:
+    scene: Scene, states: States, ranks: Ranks, checkpoint: Checkpoint, style: Style = "quiet", first: int = 0
+) -> list[Life]:  # fmt: skip
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
     plan = LifePlan(

@@ -163,8 +163,8 @@ def samples_dataset(
     fields, further = records.dtype.names or (), {*outcome.ON_REQUEST, *outcome.JUDGED}
     optional = (further - {"regime"}) & {*fields}
     asked = {name for name in optional if np.isfinite(records[name]).any()}
-    if records["regime"].any():  # no period anywhere is an answer as well
-        asked |= {*outcome.STEADY, "regime"}
+    if records["regime"].any() or {*outcome.MAPPED} & {*fields}:  # no period is an answer as well
+        asked |= {*outcome.JUDGED}
     left_out = {"sample", "band", *(further - asked)}
     kept = [name for name in fields if name not in left_out]
     bands = _bands_of(records)

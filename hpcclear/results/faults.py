@@ -45,7 +45,7 @@ def _outcome_fault(content: Results) -> str | None:
     if not np.isin(status, [int(code) for code in Status]).all():
         return "a status is unknown"
     finished = status == Status.OK
-    if (finished & ~np.isfinite(content["objective"].values)).any():
+    if "objective" in content and (finished & ~np.isfinite(content["objective"].values)).any():
         return "a finished simulation has no objective"
     for name in NUMBERS:
         judged = name not in JUDGED or "regime" in content  # 0 where nobody looked

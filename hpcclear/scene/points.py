@@ -206,12 +206,8 @@ def _check_laws(get: Numbers, points: Points, label: Label) -> None:
 
 
 def latin_hypercube(
-    scene: Scene,
-    samples: int | None = None,
-    *,
-    names: Sequence[str] | None = None,
-    purpose: str = "train",
-) -> Points:
+    scene: Scene, samples: int | None = None, *, names: Sequence[str] | None = None, purpose: str = "train"
+) -> Points:  # fmt: skip
     """The study's Latin hypercube over its variables, SI; a variable given as a ratio comes as the inertia it stands for.
 
     `names`: the variables that vary, in the order of the columns (all by default); the others stay as in the scene. Designs for
