@@ -12,7 +12,9 @@ from hpcclear.dynamics import evaluation
 from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.report.failures import SampledVariable, explained, where
 from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
 from hpcclear.report.html.designs import _cell
+from hpcclear.report.screens import screen_of
 from hpcclear.results.content import Results, Variable
 from hpcclear.scene import load_scene
 
@@ -71,6 +73,7 @@ def test_samples_say_by_which_status_where_and_what_to_do():
     assert text.startswith(f"{count} of 60 samples step_cap: {Status.STEP_CAP.message}; all at m2 ")
     assert "(range " in text
     assert text.endswith(f". {Status.STEP_CAP.remedy}")
+    assert f"{count} of 60 " in screen_of(Content(Path(), {"samples": samples})).doubt
 
 
 # -- corners ---------------------------------------------------------------------------------------------

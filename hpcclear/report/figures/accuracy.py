@@ -233,7 +233,8 @@ def total_figure(accuracy: Results) -> "style.Figure":
         panel.plot(1e3 * own.seconds, own.error, **square, label="your settings")
     # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
     box = panel.dataLim
-    panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
+    if np.isfinite(box.get_points()).all():  # none where everything failed
+        panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
     best_for: dict[targets.Way, list[str]] = {}
     for aim in targets.TARGETS:
         if (way := targets.cheapest(accuracy, aim)) is not None:

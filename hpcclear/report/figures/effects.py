@@ -103,7 +103,7 @@ def statements(content: Results, seconds: Times) -> list[str]:
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
     chosen = int(np.argmax(content["recommended"].values))
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
-    last = f"No effect can be neglected within {tolerance}."
+    last = f"No effect was found negligible within {tolerance}."
     if chosen:
         names, saved = ", ".join(named(content, chosen)), saving(content, chosen, seconds).words
         last = f"Within {tolerance} these effects can be neglected: {names}. Time saved: {saved}."

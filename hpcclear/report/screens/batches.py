@@ -8,6 +8,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.base.plain import counted
 from hpcclear.base.student import student
 from hpcclear.report import bearings, failures, spread
+from hpcclear.report.answer import MANY
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted
@@ -54,7 +55,7 @@ def samples(found: Results, content: Content) -> Screen:
     return Screen(
         labels.sentence(headline, found),
         (f"f: {labels.objective(found)}", counted(len(f), "simulation"), varied),
-        "the contact model is outside its range" if share > MOST else "",
+        _doubt(share, int((found["status"].values != Status.OK).sum()), len(f)),
         tuple(Tile(name, one[0], within=one[1]) for name, one in stated.items() if name in first),
         rows=tuple(rows),
         trust=trusted(_trust(found), share > MOST),
@@ -70,16 +71,20 @@ def _stated(line: spread.Line) -> tuple[str, str]:
     return shown, f"95 % CI {within}" if value else ""
 
 
+def _doubt(outside: float, failed: int = 0, total: int = 0) -> str:
+    """Why results are indicative only: of simulations a share outside the contact model's range, and some that failed."""
+    found = ["the contact model is outside its range"] if outside > MOST else []
+    if MANY * total < failed < total:
+        found.append(f"{failed} of {total} simulations failed")
+    return "; ".join(found)
+
+
 def _share(found: Results, flag: Flag) -> float:
     return float(((found["flags"].values & int(flag)) != 0).mean()) if "flags" in found else 0.0
 
 
 def _trust(found: Results) -> Iterator[Trust]:
-    good = found["status"].values == Status.OK
-    for text in failures.explained(found)[:2]:
-        yield (amber if good.any() else red)(text, "quality")
-    if good.all():
-        yield green("No simulation failed", "quality")
+    yield from _failed(found)
     outside = bearings.outside(found) or "forces are indicative"
     yield from _flagged({flag: _share(found, flag) for flag in Flag}, outside)
     name = "objective_limit" if "objective_limit" in found else "objective_uncertainty"
@@ -88,6 +93,15 @@ def _trust(found: Results) -> Iterator[Trust]:
         yield amber(text, "quality")
     if "sampling" not in found.attrs:
         yield amber("The designs were chosen, not drawn: no intervals", "quality")
+
+
+def _failed(found: Results, what: str = "samples") -> Iterator[Trust]:
+    """How many simulations failed, why, and where; that none did."""
+    lost, columns = found["status"].values != Status.OK, failures.variables(found)
+    for text in list(failures.sentences(found["status"].values, columns, what))[:2]:
+        yield (red if lost.mean() > MANY else amber)(text, "quality")
+    if not lost.any():
+        yield green("No simulation failed", "quality")
 
 
 def _flagged(shares: Mapping[Flag, float], outside: str, what: str = "samples") -> Iterator[Trust]:
@@ -106,7 +120,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
     """Return the first screen of a map."""
     good = found["status"].values == Status.OK
     regimes = found["regime"].values
-    cells, count = counted(len(good), "cell"), int(good.sum())
+    cells = counted(len(good), "cell")
     kinds = [(regime, int(((regimes == regime) & good).sum())) for regime in Regime]
     kinds = sorted((one for one in kinds if one[1]), key=lambda one: -one[1])
     growth = found["lyapunov_exponent"].values[good]
@@ -126,8 +140,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
             Tile("range of f", labels.between(float(f.min()), float(f.max()), unit)),
         )
     axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
-    level = green if count == len(good) else amber
-    trust = [level(f"{count} of {cells} without failure", "quality")]
+    trust = [*_failed(found, "cells")]
     moving = (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
     if open_ := sum(n for regime, n in kinds if regime in moving):
         text = f"{counted(open_, 'cell')} not settled: longer transients would decide"
@@ -137,7 +150,7 @@ def map_of_motion(found: Results, content: Content) -> Screen:
     rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
     return Screen(
         headline, (f"{cells} over {axes}", f"f: {labels.objective(found)}"),
-        "the contact model is outside its range" if share > MOST else "",
+        _doubt(share),
         tiles, ("motion", "cells") if rows else (), rows, trust=trusted(trust, share > MOST),
         figures=("map",),
     )  # fmt: skip
@@ -153,13 +166,12 @@ def bifurcation(found: Results, content: Content) -> Screen:
     if failed < count:
         ends = float(np.nanmin(seen.values)), float(np.nanmax(seen.values))
         headline = f"{what}: {labels.between(*ends, unit)}"
-    level = amber if failed else green
-    trust = [level(f"{count - failed} of {count} values without failure", "reproduce")]
+    trust = [*_failed(found, "values")] if "status" in found else []  # older files
     share = _share(found, Flag.BEYOND_HERTZ)
     trust += _flagged({Flag.BEYOND_HERTZ: share}, bearings.outside(found), "values")
     return Screen(
         headline, (f"{count} values, {crossings} revolutions each",),
-        "the contact model is outside its range" if share > MOST else "",
+        _doubt(share),
         trust=trusted(trust, share > MOST), figures=("bifurcation",),
     )  # fmt: skip
 
@@ -178,16 +190,16 @@ def statistics(found: Results, content: Content) -> Screen:
         pairs = zip((mean, deviation), halves, strict=True)
         shown = [labels.with_half_width(*one, unit) for one in pairs]
         headline = f"mean of f {shown[0]}, standard deviation {shown[1]}"
-    level = amber if good < total else green
+    level = green if good == total else red if total - good > MANY * total else amber
     counts = found["samples_by_flag"]
     shares = {flag: float(counts.sel(flags=int(flag))) / max(total, 1) for flag in Flag}
     lost = level(f"{good} of {total} simulations without failure", "quality")
     single = amber("The half-width of a single f was not checked", "quality")
     trust = [lost, *_flagged(shares, "forces are indicative"), single]
-    outside = shares[Flag.BEYOND_HERTZ] > MOST
-    doubt = "the contact model is outside its range" if outside else ""
+    outside = shares[Flag.BEYOND_HERTZ]
     about, headline = (f"f: {labels.objective(found)}",), labels.sentence(headline, found)
-    return Screen(headline, about, doubt, trust=trusted(trust, outside))
+    doubt = _doubt(outside, total - good, total)
+    return Screen(headline, about, doubt, trust=trusted(trust, outside > MOST))
 
 
 def _error_of_deviation(found: Results) -> float:

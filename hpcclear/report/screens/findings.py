@@ -8,6 +8,7 @@ import numpy as np
 from hpcclear.base.plain import counted
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import identified, targets
+from hpcclear.report.answer import MANY
 from hpcclear.report.figures import effects as screening, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Screen, ScreenRow, Tile, Trust, amber, green, red, trusted, upper
@@ -68,7 +69,7 @@ def effects(found: Results, content: Content) -> Screen:
     tolerance = f"{100 * float(found.attrs['tolerance']):g} %"
     chosen = int(np.argmax(found["recommended"].values))
     names, saved = screening.named(found, chosen), screening.saving(found, chosen, seconds)
-    headline = f"No effect can be neglected within {tolerance}"
+    headline = f"No effect was found negligible within {tolerance}"
     if chosen:
         more = f"run time saved {saved.words}"
         headline = f"Within {tolerance}, {', '.join(names)} can be neglected: {more}"
@@ -88,13 +89,15 @@ def effects(found: Results, content: Content) -> Screen:
 
 def _screened(found: Results) -> Iterator[Trust]:
     decisions = found["decision"].values[1:]
+    failed, total = (int(np.sum(found[name].values)) for name in ("failed", "samples"))
     if open_ := int((decisions == Verdict.UNDECIDED).sum()):
-        text = f"{open_} of {len(decisions)} variants are undecided: more samples would decide"
-        yield amber(text, "effects")
+        remedy = "correct what fails" if failed else "more samples would decide"
+        yield amber(f"{open_} of {len(decisions)} variants are undecided: {remedy}", "effects")
     else:
         yield green("Every variant is decided", "effects")
-    if failed := int(np.sum(found["failed"].values)):
-        yield amber(f"{counted(failed, 'simulation')} failed", "effects")
+    if failed:
+        shade = red if failed > MANY * total else amber
+        yield shade(f"{failed} of {counted(total, 'simulation')} failed", "effects")
     level = f"{100 * float(found.attrs['confidence']):.0f} %"
     yield green(f"Intervals of {level}, from averages over the same points", "effects")
 

@@ -112,6 +112,8 @@ def _doubt(of: Recommended) -> str:
     found = []
     if beyond_hertz(of.best) > MOST:
         found.append("the contact model is outside its range")
+    if int(of.best["failed"]) > MANY * int(of.best["samples"]):
+        found.append(_failed(of.best))
     if verdict_of(of.best) is Verdict.UNDECIDED:
         found.append("constraints are undecided")
     if text_in(of.best, "accuracy_missed"):
@@ -281,11 +283,15 @@ def _accuracy(best: Results) -> Trust:
     return green(f"Accuracy: {', '.join(known)}", "quality")
 
 
+def _failed(best: Results) -> str:
+    return f"{int(best['failed'])} of {int(best['samples'])} simulations of this design failed"
+
+
 def _failures(of: Recommended) -> Iterator[Trust]:
     best, samples = of.best, of.files.get("samples")
     if failed := int(best["failed"]):
-        text = f"{failed} of {int(best['samples'])} simulations of this design failed"
-        yield amber(text, "quality")
+        level = red if failed > MANY * int(best["samples"]) else amber
+        yield level(f"{_failed(best)}: the others make the results", "quality")
     status = np.zeros(0) if samples is None else samples["status"].values
     if lost := int((status != Status.OK).sum()):
         yield amber(f"{lost} of {len(status)} samples failed", "quality")

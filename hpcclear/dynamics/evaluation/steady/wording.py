@@ -81,6 +81,7 @@ def in_short(scene: Scene, records: Records) -> str:
     if len(good) == 0:
         return "no sample finished"
     limit = np.nanmedian(good["objective_limit"] / good["objective"])
-    text = f"half-width {limit:.0e}, met by {100 * (1.0 - missed(good).mean()):.0f} %"
+    met = (len(good) - missed(good).sum()) / len(records)  # what failed has met nothing
+    text = f"half-width {limit:.0e}, met by {100 * met:.0f} %"
     chaotic = np.isin(good["regime"], (Regime.CHAOTIC, Regime.SEVERAL)).mean()
     return text + (f", {100 * chaotic:.0f} % chaotic" if chaotic else "")
