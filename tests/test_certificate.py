@@ -526,9 +526,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
     content = opened.read(tmp_path / "effects.nc", "effects")
     chosen = content.isel(variant=int(np.argmax(content["recommended"].to_numpy())))
     assert int(chosen["off"].sum()) == 2  # the other play, and contact damping
-    assert any(
-        "can be neglected: clearance in rod_slider, contact damping" in text for text in told
-    )
+    assert any("can be neglected: clearance in rod_slider, contact damping" in one for one in told)
     monkeypatch.setattr(stage, "sample_points", None)  # all is kept: nothing is simulated again
     assert once()[1] == written
     assert statements(content, {}) is not None

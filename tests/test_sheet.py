@@ -169,6 +169,8 @@ def test_what_a_scene_is_about_stands_on_page_and_sheet(tmp_path: Path) -> None:
         assert any(text in line for line in texts)
     assert screen_of(content).title == ABOUT["title"]
     assert any("C uniform" in text for text in sheet.assumptions)
-    assert any("m2 0.105 to 0.42 kg" in text for text in sheet.limits)
+    opened.write(data.verification().assign_attrs(scene.origin), tmp_path / "verification.nc")
+    limits = " ".join(sheets._limits(read(tmp_path)))
+    assert "within m2 0.105 to 0.42 kg; m3 0.07 to 0.28 kg; u2 0 to 120 mm; I2_ratio 1" in limits
     content = SimpleNamespace(scene=load_scene(QUICKSTART.with_name("tolerances.toml")))
     assert "m3 uniform, -0.01 to 0.01 of the design." in " ".join(sheets._assumptions(content))

@@ -214,8 +214,7 @@ def test_numbers_are_unknown_where_their_simulations_all_fail(tmp_path, monkeypa
 
     monkeypatch.setattr(simulations, "sample_points", failing)
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
-    error = opened.read(tmp_path / "it" / "verification.nc")["mean_tolerance_error"]
-    assert (error.values > 0.0).all()
+    assert (opened.read(tmp_path / "it/verification.nc")["mean_tolerance_error"] > 0.0).all()
 
 
 def test_each_design_has_its_own_share(tmp_path, monkeypatch):

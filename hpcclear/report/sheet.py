@@ -19,6 +19,7 @@ from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of
+from hpcclear.results.content import Results
 
 NAME = "sheet.pdf"
 
@@ -131,9 +132,12 @@ def _limits(content: Content) -> Iterator[str]:
     yield "No interval covers the difference between model and machine."
     if (scene := content.scene) is None:
         return
-    variables = scene.study.variables if scene.study is not None else ()
-    ranges = ((one, one.range) for one in variables if one.range is not None)
-    words = [f"{one.name} {labels.between(*ends, one.unit)}" for one, ends in ranges]
+    verified = content.files.get("verification", Results({}))
+    names, words = {one.name for one in labels.design_variables(verified)}, []
+    for one in scene.study.variables if scene.study is not None else ():
+        if one.name in names and not one.rows:
+            end, unit = ("_ratio", "1") if one.ratio else ("", one.unit)
+            words.append(f"{one.name}{end} {labels.between(*one.bounds, unit)}")
     if words:
         yield f"Designs were searched within {'; '.join(words)}."
     yield from scene.warnings

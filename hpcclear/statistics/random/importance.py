@@ -149,12 +149,8 @@ def _covariance(u: Array, share: Array, centre: Array) -> Array:
 
 
 def pilot(
-    dimensions: int,
-    limit: float,
-    rng: np.random.Generator,
-    negligible: float = 0.0,
-    draws: int = PILOT,
-) -> Generator[Array, Array, Density]:
+    dimensions: int, limit: float, rng: np.random.Generator, negligible: float = 0.0, draws: int = PILOT
+) -> Generator[Array, Array, Density]:  # fmt: skip
     """Yield draws u, (n, d), take f there, (n,), NaN where it failed, and return a density near where f exceeds the limit, or
     a lower level whose probability is `negligible` already; the inputs' own one where neither is reached and that is about as
     good."""
