@@ -29,7 +29,7 @@ from scenes import Setup, ensemble, scene
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.layout.views import Outcome
+from hpcclear.dynamics.layout.views import Outcome, Parameters
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.provenance import program
@@ -58,7 +58,7 @@ def run_plain(setup: Setup) -> np.ndarray:
         setup.par,
         setup.start.rows,
         p.rtol,
-        p.atol,
+        tuple(p.atol * Parameters(setup.par[0]).tolerances(4)),
         (p.transient, p.averaged),
         latched,
         p.impact_floor,

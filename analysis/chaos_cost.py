@@ -56,7 +56,7 @@ def gaps_at(scene: Scene, rtol: float, segments: int) -> tuple[np.ndarray, float
     """Mean gaps (segments, copies, 2) of perturbed copies, and processor seconds of one revolution."""
     here = one_turn(scene, rtol, averaged_revolutions=SEGMENT)
     par = parameters(here)
-    start = perturbed(start_states(here, par), scales(here), range(5000, 5000 + COPIES))
+    start = perturbed(start_states(here, par), scales(here, par[0]), range(5000, 5000 + COPIES))
     lanes, rows = Lanes(problem_of(here), 32), np.repeat(par, COPIES, axis=0)
     lanes.step(1)
     found = []

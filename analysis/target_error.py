@@ -166,7 +166,9 @@ def _long(
     """f of the copies that ended, over so many revolutions, and where they are then."""
     par = parameters(scene)
     if start is None:
-        start = perturbed(start_states(scene, par), scales(scene), range(1000, 1000 + copies))
+        start = perturbed(
+            start_states(scene, par), scales(scene, par[0]), range(1000, 1000 + copies)
+        )
     numerics = {
         "rtol": rtol,
         "atol": None,

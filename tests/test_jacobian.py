@@ -53,9 +53,8 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     rows[at.Q : at.Q + n] = start.coordinates(n)[:, None] + away  # |e| above the clearance
     rows[at.V : at.V + n] = start.velocities(n)[:, None]
     settings = problem.settings()
-    least = (settings.atol_coordinates[:n], settings.atol_velocities[:n])
-    for first, atol in zip((mem.LEAST, mem.LEAST + N), least, strict=True):
-        rows[first : first + n] = (atol / settings.rtol)[:, None]
+    least = settings.atol / settings.rtol * par[0, at.tolerance_rows(n)]
+    rows[mem.LEAST + np.r_[:n, N : N + n]] = least[:, None]
     for i in range(COLUMNS):
         fit_to_ramp(par[0], 0, 1, m, i, settings.rows)
     return problem, m

@@ -46,11 +46,12 @@ def scenes():
         yield pytest.param(name, marks=[] if name in SPREAD else [pytest.mark.full])
 
 
-def differing(scene: Scene) -> list[str]:
+def differing(scene: Scene, path: str = "", value: float = 0.0) -> list[str]:
     """Scalars, and numbers at joints, whose bytes are not those of the sample of the same design."""
-    path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))
-    sample = hpcclear.evaluate(scene, {path: [scene.number(path)]}).isel(sample=0)
-    response = hpcclear.simulate(scene)
+    path = path or next(path for path in scene.numeric_paths() if path.endswith(".mass"))
+    value = value or scene.number(path)
+    sample = hpcclear.evaluate(scene, {path: [value]}).isel(sample=0)
+    response = hpcclear.simulate(scene.with_({path: value}), checked=False)
     common = [
         name
         for name, one in sample.data_vars.items()
@@ -65,6 +66,27 @@ def test_a_response_has_the_bits_of_the_sample(name: str):
     scene = scene_of(name).with_(SHORT)
     assert coordinate_count(scene)
     assert differing(scene) == []
+
+
+LUGRE = {
+    "law": "lugre", "coefficient": 0.1, "static_coefficient": 0.15, "stribeck_speed": 0.01, "bristle_stiffness": 1e5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "value"),
+    [
+        ({"drive.speed": 30.0}, "drive.speed", -20.0),
+        ({"drive.speed": 30.0}, "mechanism.crank.length", 0.06),
+        ({"effects.friction": LUGRE}, "drive.speed", 60.0),
+        ({"effects.friction": LUGRE}, "effects.friction.static_coefficient", 0.2),
+        ({"mechanism.rod.bending": {"stiffness": 20.0}}, "mechanism.rod.bending.stiffness", 60.0),
+        ({"numerics.target_error": 0.05, "drive.speed": 30.0}, "drive.speed", 60.0),
+    ],
+)
+def test_tolerances_are_those_of_the_sample_and_not_of_its_scene(changes, path: str, value: float):
+    scene = scene_of("slider_crank.toml").with_(SHORT | changes)
+    assert differing(scene, path, value) == []
 
 
 def parting(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

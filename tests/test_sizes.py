@@ -23,8 +23,8 @@ NONE_OPEN = Stepped(rules_of(at.Effects()), np.zeros(0, np.int64))
 
 
 @lane_function
-def last_stage_and_error(n, effects, work, room, par, weights, atol, stages, W):
-    step = Step(work, room, par, weights, n, 1e-3, atol, W)
+def last_stage_and_error(n, effects, work, room, par, weights, stages, W):
+    step = Step(work, room, par, weights, n, 1e-3, W)
     stage_state(step, stages - 1, stages - 1, W)
     step_error(effects, step, stages, W)
 
@@ -36,15 +36,13 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau)
     s = pair.stages - 1
     rng = np.random.default_rng(n)
     work, par = rng.normal(size=(at.WORK, W)), np.ones((at.PARAMETERS, W))
-    room, atol = (
-        rng.normal(size=(pair.stages, at.MAX_COORDINATES, W)),
-        rng.uniform(0.5, 1.0, (2, at.MAX_COORDINATES)),
-    )
+    room = rng.normal(size=(pair.stages, at.MAX_COORDINATES, W))
+    atol = par[at.tolerance_rows(n)] = rng.uniform(0.5, 1.0, (2 * n, W))
     stages = room[:, :n].copy()
     work[at.STEP] = 1e-2
     work[at.STRICTER] = 4.0
     before = work.copy()
-    given = n, NONE_OPEN, *(one.ravel() for one in (work, room, par, pair.packed(), atol))
+    given = n, NONE_OPEN, *(one.ravel() for one in (work, room, par, pair.packed()))
     known = {"W": W, "stages": pair.stages}
     Compiled(last_stage_and_error, kind_of(given).parts, FASTMATH, **known)(*given)
     h = before[at.STEP]
@@ -58,8 +56,8 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau)
     stages[s] = a
     error_v = h * np.einsum("j,jkw->kw", pair.e, stages)
     error_q = h * h * np.einsum("j,jkw->kw", pair.e @ pair.a, stages)
-    scale_q = atol[0, :n, None] + 1e-3 * np.maximum(abs(q), abs(qs))
-    scale_v = atol[1, :n, None] + 1e-3 * np.maximum(abs(v), abs(vs))
+    scale_q = atol[:n] + 1e-3 * np.maximum(abs(q), abs(qs))
+    scale_v = atol[n:] + 1e-3 * np.maximum(abs(v), abs(vs))
     mean = ((error_q / scale_q) ** 2 + (error_v / scale_v) ** 2).sum(axis=0) / (2 * n)
     np.testing.assert_allclose(work[at.ERROR], 4.0 * mean, rtol=1e-9)
     for row in (*range(at.QS, at.QS + n), *range(at.VS, at.VS + n), at.ERROR):
@@ -70,9 +68,7 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau)
 def test_what_does_not_fit_is_refused():
     problem = problem_of(scene_with())
     with pytest.raises(ValueError, match="88 coordinates at most, not 89"):
-        replace(problem, coordinates=89, atol=178 * problem.atol[:1])
-    with pytest.raises(ValueError, match="8 tolerances, not 7"):
-        replace(problem, atol=problem.atol[:7])
+        replace(problem, coordinates=89)
     many = np.eye(15)
     with pytest.raises(ValueError, match="pairs of 14 stages at most"):
         tab.Tableau("long", 2, 1, many, many[0], many[0], "none")

@@ -60,7 +60,7 @@ def truth(chaotic: bool) -> tuple[float, float]:
     }
     problem = problem_of(scene.with_({f"numerics.{k}": v for k, v in numerics.items()}))
     par = parameters(scene)
-    start = perturbed(start_states(scene, par), scales(scene), range(1000, 1064))
+    start = perturbed(start_states(scene, par), scales(scene, par[0]), range(1000, 1064))
     gaps = Lanes(problem, 16).run(np.repeat(par, 64, axis=0), start).mean_gap
     return float(objective(gaps.mean(axis=0))), float(objective(gaps).std(ddof=1) / 8.0)
 

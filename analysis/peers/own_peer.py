@@ -11,7 +11,7 @@ from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
-from peers.system import SLIDER, Array
+from peers.system import SLIDER, Array, tolerances
 
 
 def lanes_positions(setup: Setup, width: int) -> Array:
@@ -68,7 +68,13 @@ def plain_positions(setup: Setup) -> Array:
     latched = p.effects.latched is not None
     revolutions = (p.transient, p.averaged)
     found = plain_loop.run(
-        setup.par, setup.start.rows, p.rtol, p.atol, revolutions, latched, p.impact_floor
+        setup.par,
+        setup.start.rows,
+        p.rtol,
+        tuple(tolerances(setup)),
+        revolutions,
+        latched,
+        p.impact_floor,
     )
     return found[:, 1]
 

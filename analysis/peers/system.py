@@ -33,4 +33,4 @@ def end_time(setup: Setup, sample: int = 0) -> float:
 
 def tolerances(setup: Setup) -> Array:
     """Absolute tolerance of each state, shape (8,)."""
-    return np.array(setup.problem.atol)
+    return setup.problem.atol * Parameters(setup.par[0]).tolerances(4)

@@ -160,7 +160,7 @@ def solve_turn(
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     limit = 20.0 * period if one.free else period
     turn_end = float(one.named.turn_end)
-    atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
+    atol = one.problem.atol * one.named.tolerances(one.n) * rtol / one.problem.rtol
     atol = np.append(atol, one.size * [rtol * 1e-3 * period])
     t, y, peak, count = 0.0, start, 0.0, 0
     for _ in range(100_000):

@@ -59,7 +59,8 @@ class Run:
     def of(cls, scene: Scene) -> "Run":
         """Nothing simulated yet: every copy of every tolerance has a perturbation of its own."""
         here = one_turn(scene)
-        first, scale = start_states(here, parameters(here)), scales(here)
+        par = parameters(here)
+        first, scale = start_states(here, par), scales(here, par[0])
         count = len(TOLERANCES)
         numbers = (range(k, k + COPIES) for k in range(1, count * COPIES, COPIES))
         starts = [perturbed(first, scale, own).rows for own in numbers]

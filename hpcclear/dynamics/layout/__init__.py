@@ -100,6 +100,9 @@ HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest driv
 HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
+# of coordinates, from MAX_COORDINATES on of velocities; lanes hold them times the run's
+LEAST = OF_SAMPLE("absolute tolerances over that of lengths", size=192)
+
 OF_JOINT = RowNumbers()  # within a joint's block
 CLEARANCE = OF_JOINT("radial clearance", "m")
 BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")
@@ -127,6 +130,12 @@ THRESHOLDS = OF_SAMPLE("of what share of the normal force wears", size=2 * MAX_J
 FURTHER_ROWS = 180
 FURTHER = OF_SAMPLE("what laws of films have besides", size=MAX_JOINTS * FURTHER_ROWS)
 PARAMETERS = OF_SAMPLE.end
+
+
+def tolerance_rows(n: int) -> np.ndarray:
+    """Rows of `LEAST` in use for n coordinates, those of their velocities last."""
+    return LEAST + np.r_[:n, MAX_COORDINATES : MAX_COORDINATES + n]
+
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
 # What joints have stands side by side, so that the compiler knows the distances between one joint's rows, whichever it is.

@@ -205,8 +205,7 @@ class RunSettings(View):
     at_rest = _rows.column("within which a crank that starts from rest may turn back", "rad")
     senses = _rows.column("1 where explicit steps look out for the edge of stability")
     chosen = _rows.column("of each joint: 1 where its gap counts for the objective", "", EACH)
-    atol_coordinates = _rows.column("absolute tolerances", "", at.MAX_COORDINATES)
-    atol_velocities = _rows.column("and of velocities", "", at.MAX_COORDINATES)
+    atol = _rows.column("absolute tolerance of lengths", "m")
     wraps = _rows.column("of coordinates with each revolution", "rad", at.MAX_COORDINATES)
     size = _rows.end
 
@@ -230,6 +229,10 @@ class Parameters(View):
     journal_radius = _entry(at.JOURNAL_RADIUS)
     inverse_ramp = _entry(at.INVERSE_RAMP)
     steepness = _entry(at.STEEPNESS)  # s/m
+
+    def tolerances(self, n: int) -> Array:
+        """Absolute tolerances of n coordinates, then velocities, over that of lengths, shape (..., 2 n)."""
+        return self.rows[..., at.tolerance_rows(n)]
 
     @property
     def contact_numbers(self) -> Array:

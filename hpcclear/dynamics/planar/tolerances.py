@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.planar.problem import driven_length, is_prescribed, linkage_of
+from hpcclear.dynamics.linkage.parts import Number
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.laws.numbers import evaluate
 from hpcclear.scene import Scene
 
@@ -22,47 +24,41 @@ Explicit ones are then limited to some 2 of these, and contacts need a thousand 
 help: they come back too often."""
 
 
-def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
-    """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
+def tolerances(scene: Scene, sample: Mechanism, p: Array, friction: dict[str, object]) -> Array:
+    """Absolute tolerances of coordinates, then velocities, over that of lengths: 1, 10/m, 1000/s, 50000/(m s), (m, 2 n).
 
-    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the driven body's points move
-    slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
+    With the default, rtol times 1 mm, they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the driven body's points move
+    slower than 25 m/s the velocities' are less in proportion: what is small is set by the sample's own speed.
+    Of samples: their mechanisms, parameters (m, PARAMETERS), and numbers of the law of friction.
     """
-    if is_prescribed(scene):
-        return ()
-    linkage = linkage_of(scene)
-    a = scene.numerics.absolute_tolerance
-    angles = [one.kind == "angle" for one in linkage.forest.coordinates[scene.modes :]]
-    speed = at.TURN / linkage.mechanism.period.seconds * float(driven_length(linkage.mechanism))
-    rate = 1e3 * min(1.0, speed / 25.0)
-    first, second = _of_bristles(scene, linkage.mechanism.period.seconds)
+    angles = [one.kind == "angle" for one in linkage_of(scene).forest.coordinates[scene.modes :]]
+    rate = 1e3 * np.minimum(1.0, at.TURN / p[:, at.PERIOD] * p[:, at.DRIVEN_LENGTH] / 25.0)
+    bristles = scene.bristles * [_of_bristles(scene, friction)]
     # however stiff a mode is, an error of its amplitude holds no more energy than one of its velocity
-    bent = [min(a, rate * a / swing) for swing in swings(linkage.mechanism)]
-    sizes = (10.0 * a if angle else a for angle in angles)
-    speeds = ((50.0 if angle else 1.0) * rate * a for angle in angles)
-    return (*first, *bent, *sizes, *second, *(rate * a for _ in bent), *speeds)
+    bent = [np.minimum(1.0, rate / swing) for swing in swings(sample)]
+    sizes = (10.0 if angle else 1.0 for angle in angles)
+    speeds = ((50.0 if angle else 1.0) * rate for angle in angles)
+    first = (one * p[:, at.PERIOD] for one in bristles)
+    rows = *first, *bent, *sizes, *bristles, *(rate for _ in bent), *speeds
+    return np.stack(np.broadcast_arrays(*rows), axis=-1)
 
 
-def _of_bristles(scene: Scene, period: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Absolute tolerances of the bristles' coordinates, whose velocities are the deflections, and of these.
+def _of_bristles(scene: Scene, friction: dict[str, object]) -> Array | float:
+    """The tolerance of the bristles' deflections, which are velocities of their coordinates, over that of lengths.
 
-    The deflection's stand for the largest in steady sliding as those of lengths stand for 1 mm, so friction is as good as
-    `rtol`. The coordinates themselves act on nothing: their tolerance is that times a revolution, which no step comes near.
+    It stands for the largest in steady sliding as those of lengths stand for 1 mm, so friction is as good as `rtol`. The
+    coordinates themselves act on nothing: their tolerance is that times a revolution, which no step comes near.
     """
-    table = scene.effects.friction
-    if not scene.bristles or table.declared.largest is None:
-        return (), ()
-    largest = float(evaluate(table.declared.largest, table.values()))
-    own = scene.numerics.absolute_tolerance / LENGTH * largest
-    return (own * period,) * scene.bristles, (own,) * scene.bristles
+    largest = scene.effects.friction.declared.largest
+    return 1.0 if largest is None else evaluate(largest, friction) / LENGTH
 
 
-def swings(mechanism: Mechanism) -> tuple[float, ...]:
+def swings(mechanism: Mechanism) -> tuple[Number, ...]:
     """Angular frequencies of all modes, each of its bar held at both ends, rad/s, in the order of the coordinates."""
-    found: list[float] = []
+    found: list[Number] = []
     for body in mechanism.bodies:
         if body.bending is not None:
             own = numbers(body)
             modes = range(1, body.bending.modes + 1)
-            found += [float(np.sqrt(own[f"stiffness_{k}"] / own["mass"])) for k in modes]
+            found += [np.sqrt(own[f"stiffness_{k}"] / own["mass"]) for k in modes]
     return tuple(found)

@@ -11,8 +11,8 @@ from hpcclear.base.outcome import WIDEST
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.planar.prescribed import held_extremes
-from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of
-from hpcclear.dynamics.planar.tolerances import SMOOTH
+from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of, sample_of
+from hpcclear.dynamics.planar.tolerances import SMOOTH, tolerances
 from hpcclear.laws import laws, numbers
 from hpcclear.laws.constant import with_constants
 from hpcclear.laws.declared import JOINT
@@ -28,6 +28,10 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
     p = parameters_of(scene, get, points)
+    if not is_prescribed(scene):
+        friction = _given(get, "friction", scene.effects.friction)
+        least = tolerances(scene, sample_of(scene, points), p, friction)
+        p[:, at.tolerance_rows(least.shape[1] // 2)] = least
     force = _inertia(scene, get, p)
     for k, contact in zip(scene.open_places, scene.contact_labels(), strict=True):
         block = at.JOINT_BLOCKS + k * at.JOINT_ROWS

@@ -10,7 +10,7 @@ from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
-from hpcclear.dynamics.planar.tolerances import STIFF, absolute_tolerances, swings
+from hpcclear.dynamics.planar.tolerances import STIFF, swings
 from hpcclear.dynamics.setup.parameters import parameter_rows, parameters
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.stepping.implicit.control import STEEP
@@ -121,7 +121,7 @@ def problem_of(scene: Scene) -> Problem:
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,
-        atol=absolute_tolerances(scene),
+        atol=scene.numerics.absolute_tolerance,
         impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
         transient=scene.numerics.transient_revolutions,
         averaged=scene.numerics.averaged_revolutions,

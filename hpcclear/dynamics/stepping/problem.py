@@ -14,7 +14,6 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.layout.views import Outcome, Parameters, RunSettings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.stepping.explicit.tableau import Tableau
 from hpcclear.dynamics.stepping.sample import STRICT
 
@@ -40,7 +39,7 @@ IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 class Problem:
     """Everything that is common to the samples of a run.
 
-    Raises ValueError if coordinates or tolerances do not fit the kernel.
+    Raises ValueError if the coordinates do not fit the kernel.
     """
 
     linkage: Linkage  # whose motion it is
@@ -48,7 +47,7 @@ class Problem:
     coordinates: int
     tableau: Tableau
     rtol: float
-    atol: tuple[float, ...]  # of coordinates, then velocities, SI (2 * coordinates)
+    atol: float  # of lengths, m; samples' parameters have those of all coordinates over it
     impact_floor: float  # least `latched` impact speed, m/s
     transient: int
     averaged: int
@@ -65,18 +64,13 @@ class Problem:
         n = self.coordinates
         if not 0 <= n <= at.MAX_COORDINATES:
             raise ValueError(f"the kernel holds {at.MAX_COORDINATES} coordinates at most, not {n}")
-        if len(self.atol) != 2 * n:
-            raise ValueError(f"{n} coordinates have {2 * n} tolerances, not {len(self.atol)}")
 
     def settings(self) -> RunSettings:
         """The numbers that the stepper's control reads."""
         s = RunSettings(np.zeros(RunSettings.size))
-        n = self.coordinates
-        modes = modes_of(self.linkage.mechanism)
-        length = min(self.atol[at.bristles_of(self.effects) + modes : n])
-        s.rtol = self.rtol
+        s.rtol, s.atol = self.rtol, self.atol
         # An impact is located ten times better than positions are integrated, but not below round-off.
-        s.gap_tolerance = max(0.1 * length, 4e-15)
+        s.gap_tolerance = max(0.1 * self.atol, 4e-15)
         s.angle_tolerance = max(self.rtol * 1e-3, 1e-13)
         s.impact_floor = self.impact_floor
         s.transient, s.averaged, s.max_steps = self.transient, self.averaged, self.max_steps
@@ -90,8 +84,7 @@ class Problem:
         s.profiled = at.wave_rows(self.effects) if self.effects.profile else 0
         s.chosen = 0.0 if self.chosen else 1.0
         s.chosen[list(self.chosen)] = 1.0
-        s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
-        s.wraps[:n] = self.wraps
+        s.wraps[: self.coordinates] = self.wraps
         return s
 
     @property

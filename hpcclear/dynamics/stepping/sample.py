@@ -66,6 +66,8 @@ def load(lane, W, n, block, queue, settings):
     for k in range(int(settings[RunSettings.parameter_rows])):
         block.par[k * W + lane] = queue.par[slot, k]
     make_stricter(lane, W, work, block.par, settings)
+    for k in range(at.LEAST, at.LEAST + 2 * at.MAX_COORDINATES):
+        block.par[k * W + lane] *= settings[RunSettings.atol]
     for k in range(n):
         work[(at.Q + k) * W + lane] = queue.start[slot, k]
         work[(at.V + k) * W + lane] = queue.start[slot, at.MAX_COORDINATES + k]

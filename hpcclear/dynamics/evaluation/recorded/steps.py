@@ -107,7 +107,7 @@ class Recording:
         self._refused = refused_of(scene) if alone else None
         for k, (one, copy) in enumerate(zip((scene, *beside), copies, strict=False)):
             if copy:
-                start[k] = perturbed(start[k], scales(one), range(copy, copy + 1))
+                start[k] = perturbed(start[k], scales(one, par[k][0]), range(copy, copy + 1))
         self._par = np.concatenate(par)
         self._start = Start(np.concatenate([begin.rows for begin in start]))
         kept = len(self._par)

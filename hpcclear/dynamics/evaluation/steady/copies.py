@@ -9,17 +9,17 @@ from functools import cache
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.layout.views import Start
-from hpcclear.dynamics.planar.tolerances import LENGTH, absolute_tolerances
+from hpcclear.dynamics.layout.views import Parameters, Start
+from hpcclear.dynamics.planar.tolerances import LENGTH
+from hpcclear.dynamics.setup.problem import coordinate_count
 from hpcclear.scene import Scene
 
 PERTURBATION = 1e-5  # size of the perturbations, relative to `scales`: 10 nm, 10 um/s
 
 
-def scales(scene: Scene) -> Array:
-    """Size of coordinates, then velocities, shape (2 n,): 1 mm, 0.01 rad and what tolerances hold equal to these."""
-    plain = scene.with_({"numerics.atol": None, "numerics.rtol": 1e-6})
-    return np.array(absolute_tolerances(plain)) * (LENGTH / plain.numerics.absolute_tolerance)
+def scales(scene: Scene, par: Array) -> Array:
+    """Size of coordinates, then velocities, of a sample, (2 n,): 1 mm, 0.01 rad and what tolerances hold equal to these."""
+    return LENGTH * Parameters(par).tolerances(coordinate_count(scene))
 
 
 @cache

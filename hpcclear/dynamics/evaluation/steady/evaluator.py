@@ -85,7 +85,6 @@ class SteadyEvaluator:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        self._scale = scales(scene)
         self._plain = scene.with_({"numerics.target_error": None})
         self._sets: dict[tuple[float, int], Lanes] = {}
         self._asks: dict[int, _Ask] = {}
@@ -123,7 +122,8 @@ class SteadyEvaluator:
         numbers = np.asarray(index, np.int64).tolist()
         for k, sample in enumerate(numbers):
             own = slice(k, k + 1)
-            design = Sample(par[own], start[own], self._scale, self._latched, self._free)
+            scale = scales(self.scene, par[k])
+            design = Sample(par[own], start[own], scale, self._latched, self._free)
             self._asks[sample] = _Ask(sample, points[k], design.par, self._procedure(design))
         self._queue([self._asks[sample] for sample in numbers])
 

@@ -16,9 +16,8 @@ from hpcclear.dynamics.stepping.explicit import tableau as tab
 
 
 class Step(NamedTuple):
-    """What the sums over a step read: lanes, packed tableau, coordinates, tolerances (`atol` of coordinates, then of
-    velocities from MAX_COORDINATES on); how many lanes there are, as a number that the compiler does not know: a loop of few
-    instructions it would else write out, and not vectorise."""
+    """What the sums over a step read: lanes, packed tableau, coordinates, relative tolerance; how many lanes there are, as a
+    number that the compiler does not know: a loop of few instructions it would else write out, and not vectorise."""
 
     work: Array
     stages: Array
@@ -26,7 +25,6 @@ class Step(NamedTuple):
     weights: Array
     n: int
     rtol: float
-    atol: Array
     lanes: int
 
 
@@ -118,7 +116,7 @@ def step_error(effects, step, stages, W):
 @lane_function
 def coordinate_errors(step, stages, W):
     """Add the squares of the scaled errors of coordinates and their velocities."""
-    work, weights, rtol, atol = step.work, step.weights, step.rtol, step.atol
+    work, par, weights, rtol = step.work, step.par, step.weights, step.rtol
     by_v: dict = {}
     by_q: dict = {}
     for j in written_out(range(stages)):
@@ -126,7 +124,6 @@ def coordinate_errors(step, stages, W):
         by_q[j] = weights[tab.ERROR_SQUARE + j]
     for number in range(step.n):
         k = coordinate(number)
-        least_q, least_v = atol[k], atol[at.MAX_COORDINATES + k]
         for i in range(W):
             h = work[at.STEP * W + i]
             a = work[(at.ACC + k) * W + i]
@@ -138,6 +135,6 @@ def coordinate_errors(step, stages, W):
                 dq += by_q[j] * a
             q = max(abs(work[(at.Q + k) * W + i]), abs(work[(at.QS + k) * W + i]))
             v = max(abs(work[(at.V + k) * W + i]), abs(work[(at.VS + k) * W + i]))
-            dq = h * h * dq / (least_q + rtol * q)
-            dv = h * dv / (least_v + rtol * v)
+            dq = h * h * dq / (par[(at.LEAST + k) * W + i] + rtol * q)
+            dv = h * dv / (par[(at.LEAST + at.MAX_COORDINATES + k) * W + i] + rtol * v)
             work[at.ERROR * W + i] += dq * dq + dv * dv

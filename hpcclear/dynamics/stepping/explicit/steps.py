@@ -62,7 +62,7 @@ def edge_excess(step, k, stages, i, W):
     dv = 0.0  # without a factor h
     for j in range(stages - 1):
         dv += step.weights[tab.LAST + j] * step.stages[stage_row(j, k) * W + i]
-    scale = 1.0 / step.atol[at.MAX_COORDINATES + k]
+    scale = 1.0 / step.par[(at.LEAST + at.MAX_COORDINATES + k) * W + i]
     over_step = CHATTER * (abs(new - step.stages[k * W + i]) + 1e-8 * abs(new))
     least = min(EDGE * abs(dv), over_step) * scale
     change *= scale
@@ -204,9 +204,8 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
     work = carray(lanes, (at.STAGES + stages * at.MAX_COORDINATES) * W)
     entries = carray(settings, RunSettings.size)
     behind, par = beyond(work, at.STAGES * W), beyond(work, at.WORK * W)
-    rtol, atol = entries[RunSettings.rtol], entries[RunSettings.atol_coordinates : RunSettings.size]
-    n, count = of[Asking.COORDINATES], of[Asking.WIDTH] & 127
-    step = Step(work, behind, par, carray(weights, tab.PACKED), n, rtol, atol, count)
+    rtol, n, count = entries[RunSettings.rtol], of[Asking.COORDINATES], of[Asking.WIDTH] & 127
+    step = Step(work, behind, par, carray(weights, tab.PACKED), n, rtol, count)
     effects = Stepped(rules_in(of), carray(measures, of[Asking.MEASURES]))
     curves, senses = carray(tables, at.MAX_CURVES), entries[RunSettings.senses]
     observing, motion = of[Asking.OBSERVING], of[Asking.MOTION]

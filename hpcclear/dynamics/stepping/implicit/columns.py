@@ -79,10 +79,9 @@ def take_over(n, lane, W, par, m, i, settings):
     for k in range(int(settings[RunSettings.parameter_rows])):
         m[(mem.PAR + k) * COLUMNS + i] = par[k * W + lane]
     for k in range(n):
-        by_v = settings[RunSettings.atol_coordinates + at.MAX_COORDINATES + k]
-        by_q = settings[RunSettings.atol_coordinates + k]
-        m[(mem.LEAST + k) * COLUMNS + i] = by_q / settings[RunSettings.rtol]
-        m[(mem.LEAST + N + k) * COLUMNS + i] = by_v / settings[RunSettings.rtol]
+        for row in (k, N + k):
+            least = par[(at.LEAST + row) * W + lane]
+            m[(mem.LEAST + row) * COLUMNS + i] = least / settings[RunSettings.rtol]
     forget(m, i)
     fit_to_ramp(par, lane, W, m, i, settings)
 
