@@ -5,7 +5,7 @@ import pytest
 from planar_scenes import planar_scene
 from scipy.special import ellipj, ellipk
 
-from hpcclear import load_scene, simulate
+from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.planar.problem import linkage_of
@@ -99,6 +99,12 @@ def test_the_angle_between_shafts_that_go_round_is_a_torsional_oscillator_s(kind
         begun = (spins[0, 1] - spins[0, 0]) / rate
         exact = np.radians(20.0) * np.cos(rate * times) + begun * np.sin(rate * times)
         np.testing.assert_allclose(apart, exact, atol=1e-5 * max(1.0, abs(begun)))
+
+
+def test_a_sample_of_the_other_direction_has_the_bits_of_its_scene():
+    scenes = (coupled(10.0, 0.01, speed, responses=True) for speed in (50.0, -50.0))
+    found, own = (evaluate(one, {"mechanism.drives.drive.speed": [-50.0]}) for one in scenes)
+    assert found.equals(own)
 
 
 def test_springs_whose_angle_has_no_end_are_refused():

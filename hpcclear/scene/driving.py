@@ -116,7 +116,7 @@ class PlanarSpeed(Driving, CrankSpeed):
     @property
     def advance(self) -> float:
         """By how much the angle changes until then, rad: negative clockwise."""
-        return math.copysign(2 * math.pi * self.turns, self.speed)
+        return np.copysign(2 * math.pi * self.turns, self.speed)
 
 
 class PlanarHarmonic(Driving):

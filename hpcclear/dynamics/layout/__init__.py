@@ -101,7 +101,8 @@ HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceler
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
 # of coordinates, from MAX_COORDINATES on of velocities; lanes hold them times the run's
-LEAST = OF_SAMPLE("absolute tolerances over that of lengths", size=192)
+LEAST = OF_SAMPLE("absolute tolerances over that of lengths", size=2 * MAX_COORDINATES)
+WRAPS = OF_SAMPLE("by how much coordinates are counted anew with each revolution", "rad", size=144)
 
 OF_JOINT = RowNumbers()  # within a joint's block
 CLEARANCE = OF_JOINT("radial clearance", "m")

@@ -206,7 +206,6 @@ class RunSettings(View):
     senses = _rows.column("1 where explicit steps look out for the edge of stability")
     chosen = _rows.column("of each joint: 1 where its gap counts for the objective", "", EACH)
     atol = _rows.column("absolute tolerance of lengths", "m")
-    wraps = _rows.column("of coordinates with each revolution", "rad", at.MAX_COORDINATES)
     size = _rows.end
 
 
@@ -221,6 +220,7 @@ class Parameters(View):
     strictness = Column(at.STRICTNESS)  # squared: how many times tighter than the run's tolerances
     turn_end = Column(at.TURN_END)  # rad
     driven_length = Column(at.DRIVEN_LENGTH)
+    wraps = Column(at.WRAPS, at.MAX_COORDINATES)  # rad; 0 where nothing goes round
     # of all joints, shape (..., MAX_JOINTS)
     clearance = _entry(at.CLEARANCE)
     damping = _entry(at.DAMPING)

@@ -165,17 +165,17 @@ class Linkage:
             result[k] = bent(found, q[rows], v[rows], (along, across, pose.spin[k]))
         return result
 
-    def gained(self, body: str) -> float:
-        """Return by how much a body turns in a revolution, rad, where its angle restarts with each: of a drive that prescribes
-        it by the time in the revolution, of the coordinate that gives the period, and of what springs couple to these."""
+    def gained(self, body: str, of: Mechanism) -> Number:
+        """Return by how much a body of samples turns in a revolution, rad, where its angle restarts with each: of a drive that
+        prescribes it by the time in it, of the coordinate that gives the period, and of what springs couple to these."""
         main, frame = self.mechanism.period, self.forest.frames[body]
         drive = self.forest.prescribed.get(frame)
         if drive is None and frame != self.forest.frames[main.body]:
             with_it = next(names for names in self._coupled if body in names)
             drives = main, *self.forest.prescribed.values()
             drive = next((one for one in drives if one.body in with_it), None)
-            return 0.0 if drive is None else gain_of(self.mechanism, drive)
-        return gain_of(self.mechanism, drive or main)
+            return 0.0 if drive is None else gain_of(of, drive)
+        return gain_of(of, drive or main)
 
     @cached_property
     def _coupled(self) -> list[set[str]]:

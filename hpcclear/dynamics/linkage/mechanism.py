@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+import numpy as np
+
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage import parts
@@ -201,19 +203,19 @@ def coupled(m: Mechanism) -> list[set[str]]:
     return sorted(groups, key=lambda names: GROUND not in names)
 
 
-def gain_of(m: Mechanism, drive: Drive) -> float:
+def gain_of(m: Mechanism, drive: Drive) -> parts.Number:
     """By how much the body of a prescribed drive, or of the one that gives the period, turns in a revolution, rad."""
-    main = m.period
-    if drive is main or not main.prescribed:
+    main, own = m.period, next(one for one in m.drives if one.name == drive.name)
+    if own is main or not main.prescribed:
         return main.advance
-    return drive.advance * round(main.seconds / drive.seconds)
+    return own.advance * np.round(main.seconds / own.seconds)
 
 
 def _turned(m: Mechanism) -> None:
     """Bodies whose angles loads act by can turn, and the angle does not go round and round with the revolutions: that of one
     body, or between two."""
     still, *_ = joined(m, ("slide", "fixed"))
-    gains: dict[str, set[float]] = {}
+    gains: dict[str, set[parts.Number]] = {}
     for names in coupled(m):
         driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
         gains |= {name: {gain_of(m, drive) for drive in driven} for name in names}

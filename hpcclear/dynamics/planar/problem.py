@@ -161,7 +161,9 @@ def parameters_of(scene: Scene, get: Numbers, points: Points | None) -> Array:
     linkage = linkage_of(scene)
     sample = sample_of(scene, points)
     p = np.ones((get.size, linkage.parameter_rows))
-    p[:, at.JOINT_BLOCKS : at.OWN] = 0.0
+    p[:, at.WRAPS : at.OWN] = 0.0
+    for k, one in enumerate(linkage.forest.coordinates, at.WRAPS + scene.bristles):
+        p[:, k] = linkage.gained(one.body, sample) if one.kind == "angle" else 0.0
     period = sample.period.seconds
     turns = turns_of(scene.linkage)
     p[:, at.PERIOD] = period

@@ -71,7 +71,7 @@ def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
     }
     phase = _phase(scene, linkage, par, seen)
     places = bodies_and_points(mechanism, pose, {k: one.shorter for k, one in bent.items()})
-    gained = np.array([linkage.gained(body.name) for body in mechanism.bodies])
+    gained = np.array([linkage.gained(body.name, mechanism) for body in mechanism.bodies])
     places["body_angle"] = places["body_angle"] + gained * seen.revolution[:, None]
     acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
     of_joints = {

@@ -84,16 +84,7 @@ class Problem:
         s.profiled = at.wave_rows(self.effects) if self.effects.profile else 0
         s.chosen = 0.0 if self.chosen else 1.0
         s.chosen[list(self.chosen)] = 1.0
-        s.wraps[: self.coordinates] = self.wraps
         return s
-
-    @property
-    def wraps(self) -> Array:
-        """By how much each coordinate (n,) is counted anew with a revolution, rad; 0 of those that do not go round with it."""
-        linkage = self.linkage
-        turns = ((one.kind == "angle", one.body) for one in linkage.forest.coordinates)
-        gained = [linkage.gained(body) if turning else 0.0 for turning, body in turns]
-        return np.array([0.0] * at.bristles_of(self.effects) + gained)
 
     def motion(self, effects: at.Effects, width: int) -> "Compiled":
         """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""

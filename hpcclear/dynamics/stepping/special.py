@@ -53,7 +53,7 @@ def answer(numbers, rules, block, queue, settings, tables):
         ends = status != OK
     elif asked == END_OF_REVOLUTION:
         for k in range(n):  # angles that go round with the revolutions keep their precision
-            block.work[(at.Q + k) * W + lane] -= settings[RunSettings.wraps + k]
+            block.work[(at.Q + k) * W + lane] -= block.par[(at.WRAPS + k) * W + lane]
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
     before = block.work[at.RUNNING * W + lane]

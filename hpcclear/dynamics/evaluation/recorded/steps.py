@@ -17,7 +17,7 @@ from hpcclear.base.outcome import failed
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator, with_pressures
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
-from hpcclear.dynamics.layout.views import Rates, Start
+from hpcclear.dynamics.layout.views import Parameters, Rates, Start
 from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.planar.problem import refused_of
 from hpcclear.dynamics.planar.response import ResponseStates
@@ -238,7 +238,8 @@ def _thinned(rows: Array, broken: Booleans) -> tuple[Array, Booleans]:
 
 def seen_between(sample: Recorded, piece: Piece, *, works: bool = False) -> ResponseStates:
     """What the motion is at the instants of a piece; `works`: those too, else there are none."""
-    wraps, n = sample.problem.wraps, sample.problem.coordinates
+    n = sample.problem.coordinates
+    wraps = Parameters(sample.par).wraps[:n]
     q, v, a, s = _state(piece, wraps)
     steps, k = piece.steps, piece.k
     revolution, contacts = steps.revolution[k], steps.contacts[k]
