@@ -100,8 +100,8 @@ HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest driv
 HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
-# of coordinates, from MAX_COORDINATES on of velocities; lanes hold them times the run's. What follows both begins a whole
-# number of pages further (320 rows): rows of joints stay in other sets of the cache than those of the state
+# of coordinates, from MAX_COORDINATES on of velocities; lanes hold them times the run's. Both together
+# have 320 rows, whole pages of 16 lanes, so that rows of joints keep their places in the sets of the cache
 LEAST = OF_SAMPLE("absolute tolerances over that of lengths", size=2 * MAX_COORDINATES)
 WRAPS = OF_SAMPLE("by how much coordinates are counted anew with each revolution", "rad", size=144)
 
