@@ -77,16 +77,8 @@ def test_a_process_keeps_pythonpath_and_the_package_of_who_started_it(tmp_path):
 def test_python_m_drops_the_directory_that_python_put_first(theirs):
     for name in BEFORE:
         (theirs / f"{name}.py").unlink(missing_ok=True)
-    done = start(
-        theirs,
-        sys.executable,
-        "-m",
-        "hpcclear",
-        "check",
-        "slider_crank.toml",
-        "--no-cost",
-        "--details",
-    )
+    words = ["check", "slider_crank.toml", "--no-cost", "--details"]
+    done = start(theirs, sys.executable, "-m", "hpcclear", *words)
     assert done.returncode == 0, done.stderr
     assert "scene hash" in done.stdout
 
@@ -141,15 +133,7 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     "reproduce --crate": ([], ["reproduce", "--crate", "."]),
 }  # fmt: skip
 """Launcher and words of each command."""
-READING = (
-    "sample --merge",
-    "export",
-    "report",
-    "reproduce",
-    "reproduce --crate",
-    "compare",
-    "plot",
-)
+READING = "sample --merge", "export", "report", "reproduce", "reproduce --crate", "compare", "plot"
 """Commands that read results."""
 LONG = ("run", "accuracy", "identify", "effects", "wear")
 """Commands that work for minutes: they are stopped before, when everything has been started."""
