@@ -159,8 +159,8 @@ def test_an_observation_is_one_value_of_each_revolution(name, unit, words):
     seen = Observation(name, np.pi / 2, 1, 3)
     what = seen.described(response)
     assert (what.unit, what.words) == (unit, words)
-    *values, flags = seen(hpcclear.load_scene(SCENE), response)
-    assert (len(values), flags) == (3, int(response["flags"]))
+    *values, flags, status = seen(hpcclear.load_scene(SCENE), response)
+    assert (len(values), flags, status) == (3, int(response["flags"]), 0)
     expected = {
         "objective": motion.objective_by_turn(response)[-3:],
         "slider_velocity": np.full(3, -0.05 * 2 * np.pi * 5000 / 60),
@@ -168,7 +168,8 @@ def test_an_observation_is_one_value_of_each_revolution(name, unit, words):
     }[name]
     np.testing.assert_allclose(values, expected, rtol=1e-9)
     response["status"].values[...] = 1
-    assert np.isnan(seen(hpcclear.load_scene(SCENE), response)[:-1]).all()
+    *values, _, status = seen(hpcclear.load_scene(SCENE), response)
+    assert (np.isnan(values).all(), status) == (True, 1)
 
 
 @pytest.mark.parametrize(
