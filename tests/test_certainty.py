@@ -14,7 +14,7 @@ from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import contest, truth
+from hpcclear.study import contest, tolerance, truth
 from hpcclear.study.optimisation import Choice
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
@@ -254,9 +254,30 @@ def test_designs_grow_by_half_unless_each_look_decides(bounds, lengths):
     scene = load_scene(ROBUST).with_({"study.cases": {"one": case}})
     run, found = SimpleNamespace(study=scene.required_study), lengths[:1]
     for _ in lengths[1:]:
-        values = np.empty((2, 16, found[-1]))
-        found.append(contest.longer(run, Choice("", "one", {}), values))
+        found.append(contest.longer(run, Choice("", "one", {}), np.empty((2, 16, found[-1]))))
     assert found == lengths
+
+
+def test_pairs_of_cases_that_grow_differently_are_no_more_than_their_designs(monkeypatch):
+    cases = {
+        "a": {"objectives": ["mean"], "constraints": [QUANTILE]},
+        "b": {"objectives": ["mean"]},
+    }
+    cases = {name: {"random": ["C"]} | one for name, one in cases.items()}
+    scene = load_scene(ROBUST).with_({"study.cases": cases})
+    run = SimpleNamespace(study=scene.required_study, scene=scene, simulations=SimpleNamespace())
+    run.of = lambda scene: SimpleNamespace(simulations=SimpleNamespace(next=0))
+    made, strict = ([np.zeros((2, 16, n)) for n in sizes] for sizes in ((32, 24), (16, 16)))
+
+    def lengthen(run, designs, made, rows, stage, more):
+        for k in rows:
+            made[k] = np.zeros((2, 16, made[k].shape[2] + more))
+
+    monkeypatch.setattr(truth, "lengthen", lengthen)
+    monkeypatch.setattr(tolerance, "_hidden", lambda *_: True)
+    choices = [Choice("", name, {}) for name in cases]
+    tolerance._lengthened(run, choices, made, strict, [0, 1], np.inf)
+    assert [one.shape[2] for one in strict] == [32, 24]
 
 
 def test_a_design_of_which_little_is_known_is_not_called_as_good():

@@ -118,6 +118,7 @@ def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():
     tight, left = tolerance.stricter(scene_of("numerics.atol=1e-7"))
     assert (tight.numerics.rtol, tight.numerics.atol) == pytest.approx((1e-6, 1e-9))
     assert tight.numerics.max_steps == 10 * scene_of().numerics.max_steps
+    assert tolerance.stricter(scene_of("numerics.max_steps=9e15"))[0].numerics.max_steps == 2**53
     assert left == pytest.approx(0.25)
     tight, left = tolerance.stricter(scene_of("numerics.rtol=1e-13"))
     assert tight.numerics.rtol == pytest.approx(1e-14)

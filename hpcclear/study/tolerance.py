@@ -23,6 +23,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
 from hpcclear.base.verdict import Verdict
 from hpcclear.scene import Scene
+from hpcclear.scene.fields import LARGEST_COUNT
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.pooled import together
@@ -103,11 +104,13 @@ def _first(length: int, designs: int, most: float) -> int:
 def stricter(scene: Scene) -> tuple[Scene, float]:
     """The scene that pairs are simulated by, and what share of a bias is left there."""
     numerics = scene.numerics
-    scene = scene.with_({"numerics.max_steps": STEPS * numerics.max_steps})
+    changes: dict[str, float] = {
+        "numerics.max_steps": min(STEPS * numerics.max_steps, LARGEST_COUNT)
+    }
     if numerics.target_error is not None:
-        return scene.with_({"numerics.target_error": 0.5 * numerics.target_error}), 0.5
+        return scene.with_(changes | {"numerics.target_error": 0.5 * numerics.target_error}), 0.5
     rtol = max(numerics.rtol / STRICTER, STRICTEST)
-    changes = {"numerics.rtol": rtol}
+    changes["numerics.rtol"] = rtol
     if numerics.atol is not None:
         changes["numerics.atol"] = numerics.atol * rtol / numerics.rtol
     return scene.with_(changes), FALL ** float(np.log10(numerics.rtol / rtol))
@@ -199,10 +202,10 @@ def _lengthened(
         taken = _known(run, designs, made, strict)
         spent = sum(one[0].size for one in strict)
         length = strict[rows[0]].shape[2]
-        more = contest.longer(run, designs[rows[0]], strict[rows[0]]) - length
+        more = min(contest.longer(run, designs[k], strict[k]) for k in rows) - length
         rows = [
             k for k in rows
-            if contest.longer(run, designs[k], strict[k]) <= made[k].shape[2]
+            if length + more <= made[k].shape[2]
             and _hidden(run, designs[k], made[k], taken.error[k])
         ]  # fmt: skip
         if not rows or spent + len(rows) * REPLICATES * more > most:
