@@ -63,12 +63,15 @@ def load(lane, W, n, block, queue, settings):
     if slot >= queue.counters[Counter.SLOTS]:
         return  # the step stays 0: a resting lane repeats its last state
     queue.counters[Counter.NEXT_SLOT] = slot + 1
-    for k in range(int(settings[RunSettings.parameter_rows])):
+    for k in range(at.LEAST):
+        block.par[k * W + lane] = queue.par[slot, k]
+    for k in range(at.JOINT_BLOCKS, int(settings[RunSettings.parameter_rows])):
         block.par[k * W + lane] = queue.par[slot, k]
     make_stricter(lane, W, work, block.par, settings)
-    for k in range(at.LEAST, at.LEAST + 2 * at.MAX_COORDINATES):
-        block.par[k * W + lane] *= settings[RunSettings.atol]
     for k in range(n):
+        for row in (at.LEAST + k, at.LEAST + at.MAX_COORDINATES + k):
+            block.par[row * W + lane] = queue.par[slot, row] * settings[RunSettings.atol]
+        block.par[(at.WRAPS + k) * W + lane] = queue.par[slot, at.WRAPS + k]
         work[(at.Q + k) * W + lane] = queue.start[slot, k]
         work[(at.V + k) * W + lane] = queue.start[slot, at.MAX_COORDINATES + k]
     for k in range(JOINTS):
