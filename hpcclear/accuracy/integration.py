@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.accuracy.looked_at import QUANTITIES, quantities_of
+from hpcclear.accuracy.looked_at import OF_A_BODY, QUANTITIES
 from hpcclear.accuracy.methods import kernel_method, methods_of, solve_turn, systems, timed
 from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array
@@ -79,7 +79,7 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
     return {
         "integrator": np.array([method.name for method in methods]),
         "rung": np.arange(len(profile.tolerances)),
-        "quantity": np.array(quantities_of(scene)),
+        "quantity": np.array(OF_A_BODY if scene.template is None else QUANTITIES),
         "setting": setting,
         "error": error,
         "seconds": seconds,

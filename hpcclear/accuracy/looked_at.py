@@ -19,11 +19,6 @@ ALONG = (0.6, 0.8)
 """Direction in which a body of a linkage is looked at: along no axis that a guide is likely to have."""
 
 
-def quantities_of(scene: Scene) -> tuple[str, ...]:
-    """Names of what methods are compared by, in the order of `methods.TurnOutcome.values`."""
-    return OF_A_BODY if scene.template is None else QUANTITIES
-
-
 def body_of(mechanism: Mechanism) -> str:
     """The body of a linkage that is looked at: the last one that no drive turns, the last of all if there is none."""
     driven = {drive.body for drive in mechanism.drives}

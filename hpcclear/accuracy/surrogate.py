@@ -37,13 +37,10 @@ def designs_of(scene: Scene, case: str, profile: Profile, rng: np.random.Generat
 
 def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
     """The objective at all designs, one after the other, shape (n,), and core-seconds of one of them."""
-    coordinates = np.concatenate(designs_of(scene, case, profile, _generator(scene)))
+    rng = generator(scene.required_study.seed, "accuracy", "surrogate")
+    coordinates = np.concatenate(designs_of(scene, case, profile, rng))
     points = points_at(scene, region_of(scene, case).names, coordinates)
     return objectives(scene, points, ranks, "surrogate: simulations")
-
-
-def _generator(scene: Scene) -> np.random.Generator:
-    return generator(scene.required_study.seed, "accuracy", "surrogate")
 
 
 def measure(
@@ -54,7 +51,8 @@ def measure(
     They are two, and what the study requests, where that is another than Kriging with the squared exponential.
     `values`, shape (n,), and `sample_seconds` are those of `simulate`.
     """
-    region, rng = region_of(scene, case), _generator(scene)
+    region = region_of(scene, case)
+    rng = generator(scene.required_study.seed, "accuracy", "surrogate")
     coordinates = designs_of(scene, case, profile, rng)
     parts = np.split(values, np.cumsum([len(one) for one in coordinates])[:-1])
     bounds = region.bounds

@@ -25,16 +25,12 @@ def preview(plan: Plan) -> str:
     row = plan.rows[-1]
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
     name = f"first look, {name}" if plan.first else name
-    doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
+    doubts = [f"± {100.0 * row.spread:.2g} % between designs"] if np.isfinite(row.spread) else []
     doubts += ["probably less"] if plan.first else []
     wall = duration(plan.wall_seconds(row, plan.simulations, plan.workers))
     text = f"{name}: {1e3 * row.seconds:.3g} ms per sample, {plan.simulations} simulations take"
     text = f"{text} {wall} on {counted(plan.workers, 'rank')}"
     return f"{text} ({'; '.join(doubts)})" if doubts else text
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
 
 
 def describe(plan: Plan, file: str, error: float | None) -> None:
@@ -46,7 +42,7 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
     rows = []
     for one in plan.rows:
         reached = "as in file" if one.error is None else f"{one.error:.0e}"
-        spread = f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""
+        spread = f" ± {100.0 * one.spread:.2g} %" if np.isfinite(one.spread) else ""
         hours = f"{plan.core_seconds(one, *job) / 3600:.2g}"
         wall = duration(plan.wall_seconds(one, *job))
         rows.append((reached, one.settings(), f"{1e3 * one.seconds:.3g}{spread}", hours, wall))

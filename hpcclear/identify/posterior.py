@@ -91,7 +91,8 @@ class Model:
         missed = np.column_stack([one.leave_one_out() for one in models]) - summaries
         missed[~np.isfinite(missed)] = 0.0
         scatter, covariance = _scatter(places[:, :unknowns], missed)
-        inverse, groups = np.asarray(np.linalg.inv(covariance), float), _groups(len(places))
+        inverse = np.asarray(np.linalg.inv(covariance), float)
+        groups = np.arange(len(places)) % FOLDS
         kept = [np.ones(len(places), bool), *(groups != k for k in range(FOLDS))]
         fewer = (tuple(_without(one, rows) for one in models) for rows in kept)
         likelihoods = tuple(Likelihood(own, scatter, inverse) for own in fewer)
@@ -128,7 +129,7 @@ class Calibration:
     ) -> "Calibration":
         """Treat the first members as machines."""
         count = min(members, len(model.places))
-        groups = _groups(len(model.places))
+        groups = np.arange(len(model.places)) % FOLDS
         out, fits = [], []
         for k in range(count):
             rng = np.random.default_rng([*seeds, 1, k])
@@ -198,11 +199,6 @@ def _resampled(weights: Array, rng: np.random.Generator) -> Integers:
     count = len(weights)
     places = (np.arange(count) + rng.random()) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), places), count - 1)
-
-
-def _groups(count: int) -> Integers:
-    """Group of each member."""
-    return np.arange(count) % FOLDS
 
 
 def _without(model: Kriging, rows: Array) -> Kriging:

@@ -24,14 +24,9 @@ def observe(
     `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times`, each (instants,): since the start of the
     revolution, and when that was; `tables`: as `Problem.tables`.
     """
-    lanes = np.repeat(new_lane(par), width)
+    lanes = np.repeat(np.concatenate([np.zeros(at.WORK), par]), width)
     both = np.ascontiguousarray(times)
     observing_code()(motion, width, lanes, tables, states, contacts, both, out)
-
-
-def new_lane(par: Array) -> Array:
-    """The rows of one lane with these parameters (PARAMETERS,)."""
-    return np.concatenate([np.zeros(at.WORK), par])
 
 
 @scalar_function
@@ -88,7 +83,8 @@ class Derivative(NamedTuple):
 
 def new_seen(n: int, par: Array, joints: int = 2) -> Derivative:
     """Memory for n coordinates and so many joints of the lane with these parameters (PARAMETERS,)."""
-    return Derivative(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
+    lane = np.concatenate([np.zeros(at.WORK), par])
+    return Derivative(np.empty(2 * n + joints), np.zeros((joints, 3)), lane)
 
 
 @scalar_function

@@ -52,13 +52,9 @@ def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     return tuple(joint for joint in joints if joint is not None)
 
 
-def _by_torque(mechanism: Mechanism) -> bool:
-    return not all(drive.prescribed for drive in mechanism.drives)
-
-
 def twin_of(mechanism: Mechanism) -> Mechanism | None:
     """The mechanism without clearance, if its drives prescribe all of its motion, or would at constant speeds."""
-    by_torque = _by_torque(mechanism)
+    by_torque = not all(drive.prescribed for drive in mechanism.drives)
     if by_torque and (mechanism.clearances or not mechanism.period.advance):
         return None
     try:
@@ -88,7 +84,7 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> Walk | None:
     if not mechanism.clearances:
         found = passage_of(assembly, rounds, gravity)
         end = found.ended
-        if _by_torque(mechanism) and end is not None:
+        if end is not None and not all(drive.prescribed for drive in mechanism.drives):
             near = any(end.node is one for one in found.changes)
             if not near or _closes(assembly, found, end.node):
                 found.ended = None  # it may swing; and inertia carries it past a change point

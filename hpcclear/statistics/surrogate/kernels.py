@@ -7,7 +7,7 @@ Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine 
 M. L. Stein, "Interpolation of Spatial Data" (1999), section 2.7.
 """
 
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,10 @@ MATERN: Kernel = "matern-5/2"
 """A function of the distance over all inputs, and no product over them."""
 ROUGH: Kernel = "matern-5/2 in two scales"
 """The same, a share `FINE` of the variance in length scales that are `FINER` times as short."""
-KERNELS: tuple[Kernel, ...] = get_args(Kernel)
 
 FINE, FINER = 0.05, 8.0
 SHARES: dict[Kernel, float] = {SQUARED_EXPONENTIAL: -1.0, MATERN: 0.0, ROUGH: FINE}
-"""Of the finer one of two Matern functions, as `hpcclear.statistics.surrogate.predictor` takes them."""
+"""Of all kernels: the finer one of two Matern functions, as `hpcclear.statistics.surrogate.predictor` takes it."""
 
 
 class Errors(NamedTuple):

@@ -59,16 +59,6 @@ class _Ask:
         return None
 
 
-def check_steady(scene: Scene) -> None:
-    """Refuse a scene whose motion goes by the time since the start, which has no steady mean; raises InputError."""
-    if linkage_of(scene).mechanism.clocked:
-        raise InputError(
-            "numerics.target_error", scene.numerics.target_error,
-            "a load or drive goes by the time since the start, so there is no steady mean",
-            "Leave it out, and average the revolutions of interest (numerics.averaged_revolutions)",
-        )  # fmt: skip
-
-
 class SteadyEvaluator:
     """Finds the steady mean of points of one scene as a stream; to be used like `evaluation.evaluator.Evaluator`.
 
@@ -79,7 +69,12 @@ class SteadyEvaluator:
     def __init__(
         self, scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, procedure: Procedure | None = None
     ) -> None:  # fmt: skip
-        check_steady(scene)
+        if linkage_of(scene).mechanism.clocked:
+            raise InputError(
+                "numerics.target_error", scene.numerics.target_error,
+                "a load or drive goes by the time since the start, so there is no steady mean",
+                "Leave it out, and average the revolutions of interest (numerics.averaged_revolutions)",
+            )  # fmt: skip
         target, budget = scene.numerics.target_error or 0.0, scene.numerics.target_revolutions
         self._procedure = procedure or (lambda sample: steady_mean(sample, target, budget))
         self.scene = scene
