@@ -94,10 +94,8 @@ def test_formulas_of_laws_have_the_value_of_an_evaluation_beside(count):
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_formulas_of_designs_have_the_value_of_an_evaluation_beside(count):
-    rng, values = (
-        random.Random(count),
-        {"m2": np.array([0.5, -2.0, 0.0, 31.0]), "C": np.array([1e-4, 3.0, 0.0, -1.0])},
-    )
+    rng = random.Random(count)
+    values = {"m2": np.array([0.5, -2.0, 0.0, 31.0]), "C": np.array([1e-4, 3.0, 0.0, -1.0])}
     for _ in range(count):
         text, value = formulas.formula(rng, tuple(values), rng.randint(1, 4), False)
         error = refusal(names_in, text)
@@ -300,10 +298,8 @@ ENDLESS = "K*d**(9**999999999)"
 def test_an_endless_formula_is_refused_in_files_overrides_and_results(tmp_path):
     """A scene file, ``--set``, and the text that a result carries, which `reproduce` and others read."""
     place = SCENE.with_name("slider_crank.toml")
-    text, law = (
-        place.read_text(encoding="utf-8"),
-        'contact = { law = "lankarani-nikravesh", restitution = 0.9 }',
-    )
+    text = place.read_text(encoding="utf-8")
+    law = 'contact = { law = "lankarani-nikravesh", restitution = 0.9 }'
     endless = f'{{ law = "expression", force = "{ENDLESS}" }}'
     changed = text.replace(law, f"contact = {endless}")
     assert changed != text

@@ -200,10 +200,8 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
             return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
-    clearance, stiffness = (
-        par[base + at.CLEARANCE],
-        par[base + row("contact", contact_law(effects), "stiffness")],
-    )
+    clearance = par[base + at.CLEARANCE]
+    stiffness = par[base + row("contact", contact_law(effects), "stiffness")]
     model = {BASES[name]: model for name, model in models_of(effects).items()}.get(base)
     factors = {name: FILM[name] * (name == model) for name in ("short", "long")}
     return Joint(

@@ -77,10 +77,8 @@ def test_a_pendulum_decays_as_its_implicit_reaction_has_it():
 
     def rates(_, y):
         angle, spin = y
-        n, t = (
-            np.array([math.cos(angle), math.sin(angle)]),
-            np.array([-math.sin(angle), math.cos(angle)]),
-        )
+        n = np.array([math.cos(angle), math.sin(angle)])
+        t = np.array([-math.sin(angle), math.cos(angle)])
         ratio = coefficient * radius * np.clip(spin * radius / 0.01, -1, 1)
         free = -MASS * GRAVITY * arm * n[0] / about
         R = MASS * (arm * free * t - arm * spin**2 * n + [0.0, GRAVITY])

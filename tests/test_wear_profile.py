@@ -207,10 +207,8 @@ def test_the_work_of_a_journal_at_rest_is_done_in_one_place():
         **{"mechanism.joints.main.wear": wear, "wear": {"profile": "angular", "harmonics": 3}}
     )
     out = run(scene).out
-    bearing, journal = (
-        out.profile[:6] / out.sliding_power[0],
-        out.profile[6:12] / out.sliding_power[0],
-    )
+    bearing = out.profile[:6] / out.sliding_power[0]
+    journal = out.profile[6:12] / out.sliding_power[0]
     angles = -0.5 * math.pi * np.arange(1, 4)
     np.testing.assert_allclose(
         bearing, np.stack([np.cos(angles), np.sin(angles)], -1).ravel(), atol=1e-6

@@ -1,7 +1,7 @@
 """What another simulation is worth, where objectives and constraints are costly and known with errors.
 
-Each objective and constraint gets one Kriging model over designs, with the kernel of Matern and the known error of each value:
-a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
+Each objective and constraint gets one Kriging model over designs, with the kernel of Matern in two scales and the known error of
+each value: a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
 probability that it keeps the constraints, and less where its own error hides what is not known yet (augmented expected
 improvement); how it may differ from the best one counts, for what both have in common decides nothing. More simulations
 of a known design are worth what they may change in which design is taken for the best (knowledge gradient). Both are compared
