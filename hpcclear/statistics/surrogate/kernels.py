@@ -19,7 +19,8 @@ SQUARED_EXPONENTIAL: Kernel = "squared-exponential"
 MATERN: Kernel = "matern-5/2"
 """A function of the distance over all inputs, and no product over them."""
 ROUGH: Kernel = "matern-5/2 in two scales"
-"""The same, a share `FINE` of the variance in length scales that are `FINER` times as short."""
+"""The same, a share `FINE` of the variance in length scales that are `FINER` times as short. On searches of a rough percentile
+shares of 0.03 to 0.15, 4 to 12 times as short, are as good, but for chance."""
 
 FINE, FINER = 0.05, 8.0
 SHARES: dict[Kernel, float] = {SQUARED_EXPONENTIAL: -1.0, MATERN: 0.0, ROUGH: FINE}

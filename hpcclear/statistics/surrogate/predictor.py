@@ -32,7 +32,7 @@ def gaussian(square: float) -> float:
 
 @partial(cached, fastmath={"contract"})
 def matern(square: float, share: float) -> float:
-    """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`; a `share` is `FINER`."""
+    """Matern 5/2 for the squared distance >= 0, a `share` of it `FINER`; as accurate and as free of branches as `gaussian`."""
     step, fine = np.sqrt(5.0 * square), FINER * np.sqrt(5.0 * square)
     low = falling(step, STEEPEST)
     fourth = low * low * low * low
