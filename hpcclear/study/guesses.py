@@ -16,7 +16,7 @@ from hpcclear.scene.domain import Box, to_coordinates
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.kernels import ROUGH
+from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import goals, truth
 from hpcclear.study.budget import FIRST
@@ -72,7 +72,7 @@ class Guesses:
         designs = to_coordinates(self._run.scene, region.names, values)
         designs = np.clip(designs, *bounds.T)  # round-off at the border
         return [
-            fit_kriging(designs, one, bounds, rng=rng, restarts=0, kernel=ROUGH).predict
+            fit_kriging(designs, one, bounds, rng=rng, restarts=0, kernel=MATERN).predict
             for one in columns
         ]
 

@@ -21,7 +21,7 @@ from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.kernels import ROUGH, Errors
+from hpcclear.statistics.surrogate.kernels import MATERN, Errors
 from hpcclear.statistics.surrogate.kriging import Kriging
 
 NOISE, APART = (1e-3, 2.0), (0.1, 2.0)
@@ -214,7 +214,7 @@ def _fitted(
         squares = np.where(made.errors > 0.0, made.errors, np.nan)[known] ** 2
     if not (size > 0.0 and np.isfinite(squares).any()):
         return fit_kriging(
-            designs, values, bounds, rng=rng, restarts=like is None, kernel=ROUGH, like=like
+            designs, values, bounds, rng=rng, restarts=like is None, kernel=MATERN, like=like
         )
     middle = float(np.nanmedian(squares))
     own = np.ones(len(values))
@@ -223,7 +223,7 @@ def _fitted(
     factors = NOISE if common is None else APART
     low, high = (max(factor * middle / size**2, 1e-8) for factor in factors)
     return fit_kriging(
-        designs, values, bounds, rng=rng, restarts=like is None, lengths=LENGTHS, kernel=ROUGH,
+        designs, values, bounds, rng=rng, restarts=like is None, lengths=LENGTHS, kernel=MATERN,
         noise=(low, max(high, 10.0 * low)), errors=Errors(own, common), like=like,
     )  # fmt: skip
 

@@ -1,14 +1,14 @@
 """What another simulation is worth, where objectives and constraints are costly and known with errors.
 
-Each objective and constraint gets one Kriging model over designs, with the kernel of Matern in two scales and the known error
-of each value: a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected
-improvement, times the probability that it keeps the constraints, and less where its own error hides what is not known yet
-(augmented expected improvement); how it may differ from the best one counts, for what both have in common decides nothing. More
-simulations of a known design are worth what they may change in which design is taken for the best (knowledge gradient). Both
-are compared by simulation: few for a new design at first, more for contenders only ("replication or exploration"). Of several
-designs at a time each takes those before it for evaluated, at the value that is expected (Kriging believer). Where no design is
-expected to win enough, draws of what is believed of all designs together say what is lost if none is simulated any more, and
-which may be the best (Thompson sampling).
+Each objective and constraint gets one Kriging model over designs, with the kernel of Matern and the known error of each value:
+a model that is free to fit noise as ripples finds what flatters it. A new design is worth its expected improvement, times the
+probability that it keeps the constraints, and less where its own error hides what is not known yet (augmented expected
+improvement); how it may differ from the best one counts, for what both have in common decides nothing. More simulations
+of a known design are worth what they may change in which design is taken for the best (knowledge gradient). Both are compared
+by simulation: few for a new design at first, more for contenders only ("replication or exploration"). Of several designs at a
+time each takes those before it for evaluated, at the value that is expected (Kriging believer). Where no design is expected to
+win enough, draws of what is believed of all designs together say what is lost if none is simulated any more, and which may be
+the best (Thompson sampling).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors D. Huang, T. T. Allen, W. I. Notz and N. Zeng,

@@ -1,30 +1,24 @@
 """Covariance functions of Kriging, by the squared distance of two points over the length scales.
 
 The squared exponential is smooth without end, the Matern function of order 5/2 can be differentiated twice: it suits what has
-kinks, and is less sure of itself between points. A sum of two suits what may have dips that are narrow against its trend.
+kinks, and is less sure of itself between points.
 
 Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 4.9 and 4.17;
 M. L. Stein, "Interpolation of Spatial Data" (1999), section 2.7.
 """
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans, Integers
 
-Kernel = Literal["squared-exponential", "matern-5/2", "matern-5/2 in two scales"]
+Kernel = Literal["squared-exponential", "matern-5/2"]
 SQUARED_EXPONENTIAL: Kernel = "squared-exponential"
 """A product over the inputs: moments under random inputs have tensor rules and a closed form."""
 MATERN: Kernel = "matern-5/2"
 """A function of the distance over all inputs, and no product over them."""
-ROUGH: Kernel = "matern-5/2 in two scales"
-"""The same, a share `FINE` of the variance in length scales that are `FINER` times as short. On searches of a rough percentile
-shares of 0.03 to 0.15, 4 to 12 times as short, are as good, but for chance."""
-
-FINE, FINER = 0.05, 8.0
-SHARES: dict[Kernel, float] = {SQUARED_EXPONENTIAL: -1.0, MATERN: 0.0, ROUGH: FINE}
-"""Of all kernels: the finer one of two Matern functions, as `hpcclear.statistics.surrogate.predictor` takes it."""
+KERNELS: tuple[Kernel, ...] = get_args(Kernel)
 
 
 class Errors(NamedTuple):
@@ -56,8 +50,8 @@ def correlation(squares: Array, kernel: Kernel) -> Array:
     """Correlations at squared distances, arrays of one shape (...)."""
     if kernel == SQUARED_EXPONENTIAL:
         return np.asarray(np.exp(-0.5 * squares))
-    parts = _scales(np.sqrt(5.0 * squares), kernel)
-    return np.asarray(sum(share * (1.0 + a + a**2 / 3.0) * b for share, _, a, b in parts))
+    steps = np.sqrt(5.0 * squares)
+    return np.asarray((1.0 + steps + steps**2 / 3.0) * np.exp(-steps))
 
 
 def with_slopes(exponents: Array, level: float, kernel: Kernel) -> tuple[Array, Array]:
@@ -74,17 +68,8 @@ def with_slopes(exponents: Array, level: float, kernel: Kernel) -> tuple[Array, 
         np.fill_diagonal(exponents, np.exp(level))
         return exponents, exponents
     np.minimum(exponents, 0.0, out=exponents)
-    parts = _scales(np.sqrt(-10.0 * exponents), kernel)
-    covariance = np.exp(level) * sum(share * (1.0 + a + a**2 / 3.0) * b for share, _, a, b in parts)
+    steps = np.sqrt(-10.0 * exponents)
+    falling = np.exp(level - steps)
+    covariance = (1.0 + steps + steps**2 / 3.0) * falling
     np.fill_diagonal(covariance, np.exp(level))
-    slopes = sum(share * finer**2 * (1.0 + a) * b for share, finer, a, b in parts)
-    return covariance, (5.0 / 3.0) * np.exp(level) * slopes
-
-
-def _scales(steps: Array, kernel: Kernel) -> list[tuple[float, float, Array, Array]]:
-    """Share of variance, how many times finer, steps and their falling exponentials of each Matern function in a kernel."""
-    falling = np.exp(-steps)
-    if kernel == MATERN:
-        return [(1.0, 1.0, steps, falling)]
-    fine = np.square(np.square(np.square(falling)))  # its eighth power: no further exponential
-    return [(1.0 - FINE, 1.0, steps, falling), (FINE, FINER, FINER * steps, fine)]
+    return covariance, (5.0 / 3.0) * (1.0 + steps) * falling

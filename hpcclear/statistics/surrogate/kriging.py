@@ -4,7 +4,7 @@ The model is ordinary Kriging with a constant mean and a fitted noise term,
 
     y(x) = mean + scale * (z(x) + noise),
     cov(z(x), z(x')) = s2 k(r), r^2 = sum_d (x_d - x'_d)^2 / l_d^2,
-    k(r) = exp(-r^2 / 2), or that of Matern of order 5/2, (1 + a + a^2 / 3) exp(-a) with a = sqrt(5) r, or two of these,
+    k(r) = exp(-r^2 / 2), or that of Matern of order 5/2, (1 + a + a^2 / 3) exp(-a) with a = sqrt(5) r,
 
 in inputs scaled to the unit cube. A linear or a quadratic trend was tried on the clearance
 objective in five inputs (200 points, five seeds) and gained nothing: median R2 0.9971 without,
@@ -23,13 +23,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.surrogate.kernels import (
-    SHARES,
-    SQUARED_EXPONENTIAL,
-    Errors,
-    Kernel,
-    correlation,
-)
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Errors, Kernel, correlation
 from hpcclear.statistics.surrogate.leaf import Columns, inside
 from hpcclear.statistics.surrogate.predictor import kernel_sum, pad
 
@@ -123,7 +117,7 @@ class Kriging:
         """
         unit = self.to_unit(inside(points, self.names, self.lower, self.upper))
         scaled, weights = self.packed
-        return kernel_sum(unit, scaled, self.length_scales, weights, self.mean, SHARES[self.kernel])
+        return kernel_sum(unit, scaled, self.length_scales, weights, self.mean, self.separable)
 
     def variance(self, points: np.ndarray) -> np.ndarray:
         """Kriging variance (n,) of the smooth part at points (n, d), in squared units of the training values. Raises InputError

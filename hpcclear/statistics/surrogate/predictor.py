@@ -12,7 +12,6 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.cached import cached
 from hpcclear.base.exponentials import falling
-from hpcclear.statistics.surrogate.kernels import FINER
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
@@ -31,21 +30,18 @@ def gaussian(square: float) -> float:
 
 
 @partial(cached, fastmath={"contract"})
-def matern(square: float, share: float) -> float:
-    """Matern 5/2 for the squared distance >= 0, a `share` of it `FINER`; as accurate and as free of branches as `gaussian`."""
-    step, fine = np.sqrt(5.0 * square), FINER * np.sqrt(5.0 * square)
-    low = falling(step, STEEPEST)
-    fourth = low * low * low * low
-    coarse = (1.0 - share) * (1.0 + step + step * step / 3.0) * low
-    return float(coarse + share * (1.0 + fine + fine * fine / 3.0) * fourth * fourth)
+def matern(square: float) -> float:
+    """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`."""
+    step = np.sqrt(5.0 * square)
+    return float((1.0 + step + step * step / 3.0) * falling(step, STEEPEST))
 
 
 @partial(cached, fastmath={"contract"})
 def _kernel_row(
-    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, share: float, row: Array
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, smooth: bool, row: Array
 ) -> None:
-    """Fill `row` with the kernel over the inputs `dims`, a place against all training points: `matern` with this share, or
-    `gaussian` where that is negative."""
+    """Fill `row` with the kernel over the inputs `dims`, a place against all training points: `gaussian` if smooth, or
+    `matern`."""
     count = row.size
     row[:] = 0.0
     for k in range(dims.size):
@@ -54,12 +50,12 @@ def _kernel_row(
         for i in range(count):
             step = place - inputs[i]
             row[i] += step * step
-    if share < 0.0:
+    if smooth:
         for i in range(count):
             row[i] = gaussian(row[i])
     else:
         for i in range(count):
-            row[i] = matern(row[i], share)
+            row[i] = matern(row[i])
 
 
 @partial(cached, fastmath=REORDER)
@@ -72,18 +68,18 @@ def _dot(a: Array, b: Array) -> float:
 
 @cached
 def kernel_sum(
-    unit: Array, scaled: Array, lengths: Array, weights: Array, level: float, share: float
+    unit: Array, scaled: Array, lengths: Array, weights: Array, level: float, smooth: bool
 ) -> Array:
     """Kriging means ``level + sum_i weights_i k(x, x_i)`` at places (n, d) in the unit cube, (n,).
 
-    `share`: of the finer one of two Matern functions, negative for the squared exponential; `scaled` (d, p): training points
-    in the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,): in the units of the answer.
+    `smooth`: whether k is the squared exponential, or the Matern function of order 5/2; `scaled` (d, p): training points in
+    the unit cube over the length scales `lengths` (d,), padded (`pad`); `weights` (p,): in the units of the answer.
     """
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
     out = np.empty(unit.shape[0])
     for j in range(unit.shape[0]):
-        _kernel_row(scaled, lengths, dims, unit[j], share, row)
+        _kernel_row(scaled, lengths, dims, unit[j], smooth, row)
         out[j] = level + _dot(weights, row)
     return out
 
@@ -160,7 +156,7 @@ def tensor_moments(
             width = starts[k + 1] - starts[k]
             inputs = dims[starts[k] : starts[k + 1]]
             for node in range(first[k], first[k + 1]):
-                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], -1.0, table[node])
+                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], True, table[node])
                 at += width
         digits[:] = 0
         changed = 0
