@@ -102,6 +102,7 @@ HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
 # of coordinates, from MAX_COORDINATES on of velocities; lanes hold them times the run's. Both together
 # have 320 rows, whole pages of 16 lanes, so that rows of joints keep their places in the sets of the cache
+# A lane is given of these only what its coordinates need: no other row stands between them and the joints.
 LEAST = OF_SAMPLE("absolute tolerances over that of lengths", size=2 * MAX_COORDINATES)
 WRAPS = OF_SAMPLE("by how much coordinates are counted anew with each revolution", "rad", size=144)
 
