@@ -139,8 +139,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         for name in names
     },
     **{
-        f"accuracy, {name}": lambda draw=draw: draw(data.accuracy())  # type: ignore[misc]
-        for name, draw in accuracy_figures.FIGURES.items()
+        f"accuracy, {draw.__name__}": lambda draw=draw: draw(data.accuracy())  # type: ignore[misc]
+        for draw in accuracy_figures.SHOWN
     },
     "samples, two variables": lambda: report.samples_figure(_odd_samples()),
     "samples, one variable": lambda: report.samples_figure(

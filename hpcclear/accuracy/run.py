@@ -195,10 +195,10 @@ def run_accuracy(
 
     def draw(content: Results) -> None:
         """Figures of what is there, and was not when they were drawn."""
-        for name, figure in accuracy_figures.FIGURES.items():
-            first, *more = accuracy_figures.MAIN[name]
+        for figure, (first, *more) in accuracy_figures.SHOWN.items():
             if first not in content:
                 continue
+            name = figure.__name__.removesuffix("_figure")
             found = [content[one].values.tobytes() for one in (first, *more) if one in content]
             if found != shown.get(name):
                 drawn[name] = style.save(figure(content), place.output / f"{name}.png")

@@ -1,12 +1,9 @@
 """Figures of what accuracy costs (kind ``accuracy``): one for each approximation of a study."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
-from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, texts_in
 
 AIM = 0.01
@@ -52,7 +49,9 @@ def _plain(axis: "style.Axes") -> None:
     axis.xaxis.set_minor_formatter(NullFormatter())
 
 
-@style.drawn
+@style.figure(
+    "Error of one revolution against run time and force evaluations, by integrator.", 2, name="accuracy-integration",
+)  # fmt: skip
 def integration_figure(accuracy: Results) -> "style.Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
     quantities = texts_in(accuracy, "quantity")
@@ -86,7 +85,9 @@ def _ladder(axes: "style.Axes", here: Results, work: str) -> None:
         _decades(axis)
 
 
-@style.drawn
+@style.figure(
+    "Error of f against averaged revolutions, by transient.", 3, name="accuracy-averaging"
+)
 def averaging_figure(accuracy: Results) -> "style.Figure":
     """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
@@ -110,7 +111,7 @@ def averaging_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure("Accuracy of the surrogates against training samples.", 4, name="accuracy-surrogate")
 def surrogate_figure(accuracy: Results) -> "style.Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
     figure, axes = style.grid(3, 1, 145.0, sharex=True)
@@ -135,7 +136,9 @@ def surrogate_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "Error of mean and standard deviation against Monte Carlo samples.", 5, name="accuracy-random-inputs",
+)  # fmt: skip
 def random_inputs_figure(accuracy: Results) -> "style.Figure":
     """Error of mean and standard deviation against Monte Carlo size and time, with 95 % CI; the surrogate's bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
@@ -165,7 +168,7 @@ def random_inputs_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure("Speed-up on the available ranks, and time lost.", 6, name="accuracy-parallel")
 def parallel_figure(accuracy: Results) -> "style.Figure":
     """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
@@ -186,7 +189,9 @@ def parallel_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    "Error of a steady mean against run time by tolerance, and the bias of each.", 1, name="accuracy-spending",
+)  # fmt: skip
 def spending_figure(accuracy: Results) -> "style.Figure":
     """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
     figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
@@ -218,7 +223,9 @@ def spending_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-@style.drawn
+@style.figure(
+    lambda found: f"Total error of f of one design against core time. {targets.caption(found)}", name="accuracy-total",
+)  # fmt: skip
 def total_figure(accuracy: Results) -> "style.Figure":
     """Total error of f of one design against run time: the cheapest settings, three targets, and the scene's own settings."""
     figure, axes = style.grid(1, 1, 90.0)
@@ -250,24 +257,13 @@ def total_figure(accuracy: Results) -> "style.Figure":
     return figure
 
 
-_FIGURES: tuple[tuple[Callable[..., "style.Figure"], tuple[str, ...], str | Callable[..., str]], ...] = (
-    (total_figure, ("spent_error", "averaging_error"),
-     lambda found: f"Total error of f of one design against core time. {targets.caption(found)}"),
-    (spending_figure, ("spent_error",), "Error of a steady mean against run time by tolerance, and the bias of each."),
-    (integration_figure, ("error",), "Error of one revolution against run time and force evaluations, by integrator."),
-    (averaging_figure, ("averaging_error",), "Error of f against averaged revolutions, by transient."),
-    (surrogate_figure, ("r2",), "Accuracy of the surrogates against training samples."),
-    (random_inputs_figure, ("moment_error",), "Error of mean and standard deviation against Monte Carlo samples."),
-    (parallel_figure, ("strong_seconds",), "Speed-up on the available ranks, and time lost."),
-)  # fmt: skip
-
-FIGURES = {draw.__name__.removesuffix("_figure"): draw for draw, *_ in _FIGURES}
-"""The figures of a dataset, by the name of their file."""
-
-MAIN = dict(zip(FIGURES, (shown for _, shown, _ in _FIGURES), strict=True))
-"""The variables that each of them shows: it can be drawn as soon as the first is there, and again with each other one."""
-
-PARTS = tuple(
-    FigureOf("accuracy", f"accuracy-{name.replace('_', '-')}", draw, caption, k)
-    for k, (name, (draw, _, caption)) in enumerate(zip(FIGURES, _FIGURES, strict=True))
-)
+SHOWN = {
+    total_figure: ("spent_error", "averaging_error"),
+    spending_figure: ("spent_error",),
+    integration_figure: ("error",),
+    averaging_figure: ("averaging_error",),
+    surrogate_figure: ("r2",),
+    random_inputs_figure: ("moment_error",),
+    parallel_figure: ("strong_seconds",),
+}
+"""The variables that each figure shows: it can be drawn as soon as the first is there, and again with each other one."""
