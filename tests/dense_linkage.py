@@ -8,10 +8,10 @@ mechanism's data only.
 import itertools
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
+import film_by_quadrature as quadrature
 import numpy as np
-from dense_mechanism import Touch, touching
 from rigid_slider import CORNERS
 from scipy.integrate import solve_ivp
 
@@ -54,17 +54,38 @@ class Jet:
         return (-self) + other
 
 
-def sine(x, shift=0.0):
+def sine_and_cosine(x):
     if not isinstance(x, Jet):
-        return math.sin(x + shift)
+        return math.sin(x), math.cos(x)
     a, d, dd = x.parts
-    s, c = math.sin(a + shift), math.cos(a + shift)
-    return Jet(s, c * d, c * dd - s * d * d)
+    s, c = math.sin(a), math.cos(a)
+    return Jet(s, c * d, c * dd - s * d * d), Jet(c, -s * d, -s * dd - c * d * d)
 
 
 def turned(vector, angle):
-    c, s = sine(angle, math.pi / 2), sine(angle)
+    s, c = sine_and_cosine(angle)
     return [vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c]
+
+
+class Touch(NamedTuple):
+    """Journal and bearing as circles: gap, depth, normal from bearing to journal and tangent, and where they touch."""
+
+    gap: float
+    depth: float
+    n: np.ndarray
+    t: np.ndarray
+    place: np.ndarray  # half way between both surfaces in contact, on that of the bearing in flight
+    own: np.ndarray  # the same in contact, on the journal's surface in flight
+
+
+def touching(joint, e, centre_b) -> Touch:
+    """Of a journal whose centre is at `e` from the bearing's."""
+    distance = np.linalg.norm(e)
+    n = e / distance
+    gap = distance - joint.clearance
+    depth = max(gap, 0.0)
+    place = centre_b + (joint.bearing_radius + depth / 2) * n
+    return Touch(gap, depth, n, np.array([-n[1], n[0]]), place, place + (gap - depth) * n)
 
 
 @dataclass
@@ -74,6 +95,24 @@ class Contact:
     factor: Any  # 1 + damping as a function of the penetration rate
     friction: Any  # friction over normal force as a function of the sliding speed
     active: float = 1.0
+    film: Any = None  # factors of its models and shear, and the least thickness over the clearance
+
+
+def film_forces(film, clearance, e, velocity, spin_journal, spin_bearing):
+    """Force of an oil film on the journal, and its moments on journal and bearing about their own centres."""
+    floor, ratio = film["floor"], np.linalg.norm(e) / clearance
+    least = (
+        floor + np.clip(1 - ratio, 0, 2 * floor) ** 2 / (4 * floor) + max(1 - ratio - 2 * floor, 0)
+    )
+    place = (1 - least) * e / np.linalg.norm(e)
+    mean = 0.5 * (spin_journal + spin_bearing)
+    w = velocity - mean * np.array([-e[1], e[0]])
+    force = film["short"] * quadrature.short(place, w) + film["long"] * quadrature.long(place, w)
+    around = np.arange(2000) * np.pi / 1000
+    shear = film["shear"] * (1 / quadrature.thickness(place, around)).mean()
+    brake = shear * (spin_journal - spin_bearing)
+    across = 0.5 * (e[0] * force[1] - e[1] * force[0])
+    return force, np.array([-brake - across, brake - across])
 
 
 @dataclass
@@ -116,7 +155,10 @@ class Dense:
             now, rate, _ = t.parts
             parts = speed.antiderivative()(now), speed(now) * rate, speed(now, 1) * rate**2
             return Jet(start + parts[0], *parts[1:])
-        return drive.mean + drive.amplitude * sine(2 * math.pi * drive.frequency * t + drive.phase)
+        return (
+            drive.mean
+            + drive.amplitude * sine_and_cosine(2 * math.pi * drive.frequency * t + drive.phase)[0]
+        )
 
     def constraints(self, q, t):
         """Rows by name: x and y of a pin; across and angle of a guide; the angle of a drive."""
@@ -151,13 +193,8 @@ class Dense:
 
     def motion_of(self, q, v, place):
         """Position and velocity of a place, and the Jacobian of its position."""
-        name = m.split(place)[0]
         here = np.array(self.place(q, place), float)
-        J = np.zeros((2, self.n))
-        if name != m.GROUND:
-            k = self.first[name]
-            J[0, k] = J[1, k + 1] = 1.0
-            J[:, k + 2] = -(here[1] - q[k + 1]), here[0] - q[k]
+        J = self.point_on(q, m.split(place)[0], here)
         return here, J @ v, J
 
     def point_on(self, q, name, where):
@@ -167,6 +204,13 @@ class Dense:
             k = self.first[name]
             J[0, k] = J[1, k + 1] = 1.0
             J[:, k + 2] = -(where[1] - q[k + 1]), where[0] - q[k]
+        return J
+
+    def turn_of(self, place):
+        """Jacobian of the angle of a place's body."""
+        J, name = np.zeros(self.n), m.split(place)[0]
+        if name != m.GROUND:
+            J[self.first[name] + 2] = 1.0
         return J
 
     def touches(self, joint, q):
@@ -195,17 +239,34 @@ class Dense:
             gap = (corner - on_line) @ n + r - face
             depth = max(gap, 0.0)
             where = corner + (r - 0.5 * depth) * n
-            yield f"{joint.name}.{name}", Touch(gap, depth, n, np.array([-n[1], n[0]]), where)
+            yield (
+                f"{joint.name}.{name}",
+                Touch(gap, depth, n, np.array([-n[1], n[0]]), where, where),
+            )
 
     def contact(self, joint, laws, q, v):
         """Generalised forces of a joint's contacts."""
-        return sum(
+        Q = sum(
             self.pressed(joint, one, touch, laws, q, v) for one, touch in self.touches(joint, q)
         )
+        return Q if laws.film is None else Q + self.oiled(joint, laws.film, q, v)
+
+    def oiled(self, joint, film, q, v):
+        """Generalised forces of an oil film; what the joint bears and loses is with it."""
+        places, seen = m.places_of(joint), self.seen[joint.name]
+        (at_j, v_j, on_j), (at_b, v_b, on_b) = (self.motion_of(q, v, place) for place in places)
+        turns = [self.turn_of(place) for place in places]
+        spins = [turn @ v for turn in turns]
+        pull, moments = film_forces(film, joint.clearance, at_j - at_b, v_j - v_b, *spins)
+        Q = (on_j - on_b).T @ pull + moments @ np.array(turns)
+        seen["normal"] = np.linalg.norm(seen["push"] - pull)
+        seen["loss"] -= Q @ v
+        return Q
 
     def pressed(self, joint, name, touch, laws, q, v):
-        gap, depth, n, t, where = touch
-        on_j, on_b = (self.point_on(q, m.split(place)[0], where) for place in m.places_of(joint))
+        gap, depth, n, t, *ends = touch
+        bodies = (m.split(place)[0] for place in reversed(m.places_of(joint)))
+        on_b, on_j = map(self.point_on, (q, q), bodies, ends)
         rate = n @ (on_j - on_b) @ v
         sliding = t @ (on_j - on_b) @ v
         elastic = laws.active * stiffness(joint) * depth**1.5
@@ -215,6 +276,7 @@ class Dense:
         loss = (normal - elastic) * rate + tangential * sliding
         self.seen[name] = {
             "gap": gap, "normal": normal, "rate": rate, "loss": loss, "elastic": elastic * rate,
+            "push": normal * n, "tangential": tangential, "sliding": sliding,
         }  # fmt: skip
         return (on_b - on_j).T @ force
 
@@ -235,10 +297,7 @@ class Dense:
                     force = np.array(turned(force, self.angle(q, load.place)))
                 own = self.motion_of(q, v, load.place)[2].T @ force
             elif load.kind == "torsion-spring":
-                signs = np.zeros(self.n)
-                signs[self.first[load.body] + 2] = 1.0
-                if load.other is not None:
-                    signs[self.first[load.other] + 2] = -1.0
+                signs = self.turn_of(load.body) - self.turn_of(load.other or m.GROUND)
                 angle, rate = signs @ q, signs @ v
                 moment = load.stiffness * (load.angle - angle) - load.damping * rate
                 if load.upper is not None and angle > load.upper:
@@ -337,10 +396,7 @@ class Dense:
         for _ in range(100):
             given, loss = np.concatenate([Q, right]), 0.0
             for joint, size in zip(pins, sizes, strict=True):
-                signs = np.zeros(self.n)
-                for place, sign in zip(m.places_of(joint), (1.0, -1.0), strict=True):
-                    if m.split(place)[0] != m.GROUND:
-                        signs[self.first[m.split(place)[0]] + 2] = sign
+                signs = self.turn_of(joint.journal) - self.turn_of(joint.bearing)
                 rubs, turning = joint.friction, signs @ v
                 x = turning * rubs.radius / rubs.ramp_speed
                 moment = rubs.coefficient * rubs.radius * size * min(max(x, -1.0), 1.0)
@@ -409,9 +465,9 @@ def assembled(dense, guess, t, eccentricities):
                 slopes = [(row(q + h) - row(q - h)) / 2e-6 for h in 1e-6 * np.eye(dense.n)]
                 jacobians.append([slopes])
         c = np.concatenate(rows)
-        if np.abs(c).max() < 1e-15:
-            break
         q = q - np.linalg.lstsq(np.vstack(jacobians), c, rcond=None)[0]
+        if np.abs(c).max() < 1e-12:  # the step from there ends at rounding
+            break
     assert np.abs(c).max() < 1e-12, np.abs(c).max()
     return q
 

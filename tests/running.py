@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bending_by_lagrange import Rod
-from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 from some_laws import row
 
 from hpcclear.base.outcome import Status
@@ -33,6 +32,8 @@ RIGID = {
 """No joint has clearance."""
 BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}
 """On the energy residual of every scene over what passed, by the tolerance, over ten revolutions."""
+# coordinates of crank, rod and slider
+X1, Y1, PHI, X2, Y2, THETA2, X3, Y3, THETA3 = range(9)
 KERNEL_ORDER = [X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI]
 
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from dense_mechanism import THETA2, X2, X3, Y2, admissible, assembled
-from running import scene_with
+from dense_linkage import admissible
+from running import THETA2, X2, X3, Y2, scene_with
 from scipy.interpolate import PchipInterpolator
 from test_motion import (
     CRANK,
@@ -14,6 +14,8 @@ from test_motion import (
     SLIDER_MASS,
     SPEED,
     dense_model,
+    drive_of,
+    pose_of,
     scene_of as scene_of_effects,
 )
 
@@ -32,7 +34,6 @@ from hpcclear.report.figures import motion, moving
 from hpcclear.scene.points import Points
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
-ZERO = np.zeros(2)
 
 
 def response(effects, angles=ANGLES, **changes):
@@ -108,21 +109,21 @@ def test_reactions_equal_the_multipliers_of_the_dense_model(effects):
     """All bodies with mass, gravity, load and guide friction."""
     angles = ANGLES[:240:7]
     held, of = response(effects, angles)
-    mech = dense_model(effects, None, np.ones(2 * at.MAX_JOINTS))
+    mech = dense_model(effects)
+    names = {
+        f"{joint}_{axis}": (joint, axis)
+        for joint, axes in (("crank_rod", "xy"), ("rod_slider", "xy"), ("crank_frame", "xy"), ("guide", ["across"]))
+        for axis in axes
+    } | {"drive_angle": ("drive", "drive")}  # fmt: skip
     expected = []
-    for time in angles / SPEED:
-        q = assembled(mech, mech.speed * time, ZERO, ZERO)
+    for phi in angles * np.sign(drive_of(mech)[0]):
+        q, time = pose_of(mech, phi), abs(phi) / SPEED
         v = admissible(mech, q, np.zeros(9), time)
         a = mech.accelerations(q, v, time)
-        bearing_x, bearing_y, guide, _, drive, px, py, rx, ry = mech.seen["multipliers"]
         motion = [row[k] for row in (q, v, a) for k in (X3, X2, Y2, THETA2)]
-        forces = [px, py, rx, ry, bearing_x, bearing_y, guide, drive]
-        expected.append([*motion, *forces, mech.seen["guide_friction"] * v[X3], mech.load * v[X3]])
+        forces = [mech.seen["multipliers"][key] for key in names.values()]
+        expected.append([*motion, *forces, mech.seen["guide_loss"], mech.seen["load_power"]])
     bodies = (("x", "slider"), ("x", "rod"), ("y", "rod"), ("angle", "rod"))
-    names = (
-        "crank_rod_x", "crank_rod_y", "rod_slider_x", "rod_slider_y", "crank_frame_x", "crank_frame_y",
-        "guide_across", "drive_angle",
-    )  # fmt: skip
     seen = [
         *(of(f"{kind}_{axis}", body) for kind in "qva" for axis, body in bodies),
         *(held.holds[name] for name in names), held.loss, held.load_power,

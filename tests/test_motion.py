@@ -1,4 +1,4 @@
-"""Equations of motion against a dense nine-coordinate model that shares no formula with them."""
+"""Equations of motion of the slider-crank against a dense model in nine coordinates that shares no formula with them."""
 
 import math
 from dataclasses import replace
@@ -6,17 +6,21 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
-from running import scene_with
+from dense_linkage import Contact, Dense, admissible, assembled
+from linkages import constant_speed, load, loose_pin, revolute, slide, torque_drive
+from running import PHI, THETA2, X2, X3, Y2, scene_with
 from some_laws import contact_law, row
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.linkage.parts import Body
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.response import violation
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.laws import laws
+from hpcclear.scene.joints import JointFriction
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}
@@ -81,7 +85,8 @@ def clip(x):
     return min(max(x, -1.0), 1.0)
 
 
-BASES = {name: at.JOINTS[k].block for k, name in enumerate(("crank_rod", "rod_slider"))}
+CLEARANCES = {"crank_rod": 3e-4, "rod_slider": 5e-4}
+BASES = {name: at.JOINTS[k].block for k, name in enumerate(CLEARANCES)}
 
 
 def bar(numbers):
@@ -134,7 +139,7 @@ def scene_of(effects):
         changes["effects"]["slider_load"] = -35.0
     if "guide" in effects:
         changes["effects"]["guide_friction"] = {"coefficient": GUIDE[0], "ramp_speed": GUIDE[1]}
-    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
+    for name, clearance in CLEARANCES.items():
         if name not in effects:
             changes[f"joints.{name}"] = {"kind": "ideal"}
             continue
@@ -145,28 +150,26 @@ def scene_of(effects):
     return scene_with(changes)
 
 
-def row_of_parameters(effects, rng):
-    """Parameters as the kernel reads them, with this file's constants and two different joints."""
+def row_of_parameters(effects):
+    """Parameters as the kernel reads them, with this file's constants."""
     par = parameters(scene_of(frozenset(effects)))[0]
-    values, law = {}, contact_law(effects)
-    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
-        base = BASES[name]
-        if name not in effects:
-            continue
-        values |= {
-            base + row("contact", law, "stiffness"): 3e9 * (1 + clearance),
-            base + at.FILM_SCALE: FILM.get(models_of(effects).get(name), 0.0),
-            base + at.FILM_SHEAR: FILM["shear"],
-            base + at.FILM_FLOOR: FILM["floor"],
+    law = contact_law(effects)
+    for joint in CLEARANCES.keys() & effects:
+        base = BASES[joint]
+        values = {
+            row("contact", law, "stiffness"): 2e9,
+            at.FILM_SCALE: FILM.get(models_of(effects).get(joint), 0.0),
+            at.FILM_SHEAR: FILM["shear"],
+            at.FILM_FLOOR: FILM["floor"],
         }
         if law != "hertz":
             factor = DAMPING if "fixed" in effects else RESTITUTION_FACTOR
-            values[base + row("contact", law, "damping")] = factor
+            values[row("contact", law, "damping")] = factor
         for rubs in {"coulomb", "ambrosio", "lugre"} & effects:
             for name in laws("friction")[rubs].read:
-                values[base + row("friction", rubs, name)] = RUBBING[name]
-    for place, value in values.items():
-        par[place] = value
+                values[row("friction", rubs, name)] = RUBBING[name]
+        for place, value in values.items():
+            par[base + place] = value
     return par
 
 
@@ -182,7 +185,7 @@ def bristle_rate(deflection, sliding):
     return sliding - abs(sliding) / held * deflection
 
 
-def joint_of(effects, par, base, active, impact_speed, deflection):
+def laws_of(effects, joint, active, impact_speed, deflection):
     def factor(rate):
         if "fixed" in effects:
             return 1 + DAMPING * rate
@@ -200,58 +203,86 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
             return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
-    clearance = par[base + at.CLEARANCE]
-    stiffness = par[base + row("contact", contact_law(effects), "stiffness")]
-    model = {BASES[name]: model for name, model in models_of(effects).items()}.get(base)
+    model = models_of(effects).get(joint)
     factors = {name: FILM[name] * (name == model) for name in ("short", "long")}
-    return Joint(
-        clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,
-        {**FILM, **factors} if model else None,
+    active = active if "latched" in effects else 1.0
+    return Contact(factor, friction, active, {**FILM, **factors} if model else None)
+
+
+def mechanism_of(effects):
+    """The slider-crank of these effects as data, beside what a scene is made into."""
+
+    def bar(name, length, mass, inertia, u):
+        return Body(name, mass, inertia, (u, 0.0), {"a": (0.0, 0.0), "b": (length, 0.0)})
+
+    def pin(name, journal, bearing):
+        if name in effects:
+            return loose_pin(name, journal, bearing, CLEARANCES[name], 0.02)
+        return revolute(name, journal, bearing)
+
+    friction = JointFriction(coefficient=GUIDE[0], ramp_speed=GUIDE[1])
+    drive = constant_speed("drive", "crank", SPEED * (-1 if "clockwise" in effects else 1))
+    size = LOADS if "two turns" in effects else -35.0
+    loaded = not effects.isdisjoint({"load", "two turns"})
+    return Mechanism(
+        (bar("crank", **CRANK), bar("rod", **ROD), Body("slider", SLIDER_MASS, points={"pin": (0.0, 0.0)})),
+        (
+            revolute("crank_frame", "crank.a", "ground.o"),
+            slide("guide", "slider.pin", "ground.line", 0.0, friction if "guide" in effects else None),
+            pin("crank_rod", "crank.b", "rod.a"),
+            pin("rod_slider", "slider.pin", "rod.b"),
+        ),
+        (torque_drive("drive", "crank", 2.5, SPEED) if "torque" in effects else drive,),
+        {"o": (0.0, 0.0), "line": (0.0, OFFSET if "offset" in effects else 0.0)},
+        (load("force", "load", place="slider.pin", size=size),) * loaded,
     )  # fmt: skip
 
 
-def dense_model(effects, par, contacts, feedback=False):
-    on = effects.__contains__
-    joints = {}
-    for k, (name, flag) in enumerate((("o12", "crank_rod"), ("o23", "rod_slider"))):
-        if on(flag):
-            joints[name] = joint_of(
-                effects,
-                par,
-                BASES[flag],
-                contacts[k],
-                1 / contacts[at.MAX_JOINTS + k],
-                DEFLECTIONS[k],
-            )
+def dense_model(effects, contacts=None, feedback=False):
+    """The dense model of these effects, by the contacts' flags and impact speeds."""
+    angles, sizes = np.transpose([*LOADS, [2 * at.TURN, LOADS[0][1]]])
     return Dense(
-        CRANK,
-        ROD,
-        SLIDER_MASS,
-        speed=None if on("torque") else SPEED * (-1 if on("clockwise") else 1),
-        torque=2.5,
-        gravity=9.81 if on("gravity") else 0.0,
-        load=-35.0 if on("load") else 0.0,
-        offset=OFFSET if on("offset") else 0.0,
-        guide=(lambda v: GUIDE[0] * clip(v / GUIDE[1])) if on("guide") else None,
+        mechanism_of(effects),
+        [
+            laws_of(effects, joint, contacts[k], 1 / contacts[at.MAX_JOINTS + k], DEFLECTIONS[k])
+            for k, joint in enumerate(CLEARANCES)
+            if joint in effects
+        ],
+        gravity=9.81 if "gravity" in effects else 0.0,
         alpha=250.0 if feedback else 0.0,
         beta=240.0 if feedback else 0.0,
-        **joints,
+        curves={"load": lambda angle: np.interp(angle % (2 * at.TURN), angles, sizes)},
     )
 
 
-def random_state(mech, rng, par, turns=1):
+def drive_of(mech):
+    """Its speed, or about that of a free crank; and the moment that it exerted."""
+    (drive,) = mech.mechanism.drives
+    moments = mech.seen.get("torques") or {
+        "drive": mech.seen.get("multipliers", {}).get(("drive", "drive"))
+    }
+    return getattr(drive, "speed", SPEED), moments["drive"]
+
+
+def pose_of(mech, phi, eccentricities=()):
+    """Nine coordinates of the mechanism at a crank angle, and eccentricities of its open joints."""
+    turn = np.array([np.cos(phi), np.sin(phi)])
+    pin, slider = CRANK["length"] * turn, CRANK["length"] * turn[0] + ROD["length"]
+    guess = [*CRANK["u"] * turn, phi, pin[0] + ROD["u"], pin[1], 0.0, slider, 0.0, 0.0]
+    return assembled(mech, guess, phi / drive_of(mech)[0], eccentricities)
+
+
+def random_state(mech, rng, turns=1):
     """A state that meets the constraints, journals up to 1.3 clearances off centre; and its time."""
     eccentric = []
-    for joint in (mech.o12, mech.o23):
-        reach = 0.0 if joint is None else joint.clearance * rng.uniform(0.7, 1.3)
-        angle = rng.uniform(0, at.TURN)
+    for joint in mech.mechanism.clearances:
+        reach, angle = joint.clearance * rng.uniform(0.7, 1.3), rng.uniform(0, at.TURN)
         eccentric.append(reach * np.array([np.cos(angle), np.sin(angle)]))
-    speed = SPEED if mech.speed is None else mech.speed
+    speed, _ = drive_of(mech)
     phi = math.copysign(rng.uniform(0, at.TURN * turns), speed)
-    q = assembled(mech, phi, *eccentric)
+    q, t = pose_of(mech, phi, eccentric), phi / speed
     wanted = rng.normal(size=9) * np.array([5, 5, SPEED, 8, 8, 90, 10, 0, 0])
     wanted[PHI] = speed * rng.uniform(0.5, 1.5)
-    t = phi / speed
     return q, admissible(mech, q, wanted, t), t
 
 
@@ -280,18 +311,14 @@ def seen_by_kernel(effects, par, q, v, contacts, t):
 
 def cases(rng, effects, count=25):
     """Random states of a set of effects with the model that describes each."""
-    par = row_of_parameters(effects, rng)
+    par = row_of_parameters(effects)
     for _ in range(count):
         contacts = np.zeros((2, at.MAX_JOINTS))
         contacts[0, :2] = rng.integers(0, 2, 2)
         contacts[1, :2] = rng.uniform(0.3, 3.0, 2)
         contacts = contacts.ravel()
-        mech = dense_model(effects, par, contacts)
-        state = random_state(mech, rng, par, turns=2 if "two turns" in effects else 1)
-        if "two turns" in effects:
-            angles, loads = np.transpose([*LOADS, [2 * at.TURN, LOADS[0][1]]])
-            mech.load = np.interp(state[0][PHI] % (2 * at.TURN), angles, loads)
-        yield par, contacts, mech, *state
+        mech = dense_model(effects, contacts)
+        yield par, contacts, mech, *random_state(mech, rng, 2 if "two turns" in effects else 1)
 
 
 def scale_of(reference):
@@ -300,11 +327,8 @@ def scale_of(reference):
 
 def check_rates(effects, mech, rates, v):
     """Gaps, forces and powers of the kernel against the dense model's."""
-    for name, flag, joint in (
-        ("o12", "crank_rod", at.JOINTS[0]),
-        ("o23", "rod_slider", at.JOINTS[1]),
-    ):
-        if flag in effects:
+    for name, joint in zip(CLEARANCES, at.JOINTS, strict=False):
+        if name in effects:
             seen = mech.seen[name]
             np.testing.assert_allclose(rates[joint.gap], seen["gap"], rtol=0, atol=1e-16)
             np.testing.assert_allclose(rates[joint.force], seen["normal"], rtol=1e-10, atol=1e-9)
@@ -314,14 +338,14 @@ def check_rates(effects, mech, rates, v):
                     rates[joint.friction], seen["tangential"], rtol=1e-9, atol=1e-9
                 )
     if "energies" in effects:
-        drive = mech.seen["drive"]
+        _, drive = drive_of(mech)
         scale = abs(drive) + 1.0
         assert rates[at.DRIVE_MOMENT] == pytest.approx(drive, rel=1e-9, abs=1e-9 * scale)
         assert rates[at.DRIVE_POWER] == pytest.approx(drive * v[PHI], rel=1e-9, abs=1e-6 * scale)
         assert rates[at.ABS_DRIVE_POWER] == abs(rates[at.DRIVE_POWER])
-        assert rates[at.LOAD_POWER] == pytest.approx(mech.load * v[X3], rel=1e-12)
-        losses = sum(mech.seen[j]["loss"] for j in ("o12", "o23") if j in mech.seen)
-        losses += mech.seen["guide_friction"] * v[X3]
+        assert rates[at.LOAD_POWER] == pytest.approx(mech.seen["load_power"], rel=1e-12)
+        losses = sum(mech.seen[joint]["loss"] for joint in CLEARANCES.keys() & effects)
+        losses += mech.seen["guide_loss"]
         assert rates[at.DISSIPATION] == pytest.approx(losses, rel=1e-9, abs=1e-7)
 
 
@@ -338,7 +362,7 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
             effects, par, reduced(effects, q), reduced(effects, v), contacts, t
         )
         if "lugre" in effects:
-            seen = [mech.seen[name] for name in ("o12", "o23") if name in mech.seen]
+            seen = [mech.seen[name] for name in CLEARANCES if name in effects]
             pairs = zip(deflected(effects), seen, strict=True)
             rates_of = [bristle_rate(z, one["sliding"]) for z, one in pairs]
             np.testing.assert_allclose(a[: len(seen)], rates_of, rtol=1e-10)
@@ -346,7 +370,7 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
         expected = reduced(effects, reference)
         np.testing.assert_allclose(a, expected, rtol=1e-10, atol=1e-10 * scale_of(reference))
         check_rates(effects, mech, rates, v)
-        contacts_met += any(mech.seen[j]["normal"] > 0 for j in ("o12", "o23") if j in mech.seen)
+        contacts_met += any(mech.seen[j]["normal"] > 0 for j in CLEARANCES.keys() & effects)
     assert contacts_met > 2 or topology == "none"
 
 
@@ -364,7 +388,7 @@ def test_power_balance_closes_at_every_instant(topology, effects):
         )
         kinetic = (mech.masses() * v) @ a
         weight = mech.gravity * (mech.masses() * v)[[1, 4]].sum()
-        stored = sum(mech.seen[j]["elastic_power"] for j in ("o12", "o23") if j in mech.seen)
+        stored = sum(mech.seen[joint]["elastic"] for joint in CLEARANCES.keys() & effects)
         supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * bool(
             {"load", "two turns"} & effects
         )
@@ -393,7 +417,7 @@ def test_baumgarte_accelerations_equal_the_dense_solve(topology, effects):
     effects = effects | TOPOLOGIES[topology] | {"baumgarte"}
     rng = np.random.default_rng(5)
     for par, contacts, _, q, v, t in cases(rng, effects):
-        mech = dense_model(effects, par, contacts, feedback=True)
+        mech = dense_model(effects, contacts, feedback=True)
         q = q + 1e-5 * rng.normal(size=9)
         v = v + 1e-2 * rng.normal(size=9)
         reference = mech.accelerations(q, v, t)
@@ -407,12 +431,11 @@ def test_baumgarte_accelerations_equal_the_dense_solve(topology, effects):
 def test_constraint_violation_is_the_largest_constraint():
     rng = np.random.default_rng(6)
     for names in TOPOLOGIES.values():
-        par = row_of_parameters(names, rng)
-        mech = dense_model(names, par, np.ones(2 * at.MAX_JOINTS))
-        q = random_state(mech, rng, par)[0] + 1e-6 * rng.normal(size=9)
-        rows = np.delete(mech.constraints(q, q[PHI] / SPEED), 4)
-        rows[3] *= ROD["length"]
+        mech = dense_model(names, np.ones(2 * at.MAX_JOINTS))
+        q = random_state(mech, rng)[0] + 1e-6 * rng.normal(size=9)
+        rows = mech.constraints(q, q[PHI] / SPEED) | {("drive", "drive"): 0.0}
+        rows["guide", "angle"] *= ROD["length"]
         linkage = linkage_of(scene_of(frozenset(names | {"baumgarte"})))
         q, still = q[KERNEL_ORDER][:, None], np.zeros((9, 1))
         got = violation(linkage, q, still, np.array([q[-1, 0] / SPEED]))
-        np.testing.assert_allclose(got, [np.abs(rows).max()], rtol=1e-9)
+        np.testing.assert_allclose(got, [np.abs([*rows.values()]).max()], rtol=1e-9)
