@@ -20,6 +20,7 @@ from hpcclear.base import host, isolated, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.base.plain import counted
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.steady import wording
 from hpcclear.ensemble.session import design, sample_points
@@ -127,7 +128,7 @@ class Plan:
             times = (duration(one(row, count, self.workers)) for one in spent)
             rows.append((error, row.settings(), f"{1e3 * row.seconds:.3g}", *times))
         header = ("target error", "settings", "ms per sample", "core time", "wall time")
-        title = f"{count} simulations on {self.workers} rank{'s' if self.workers > 1 else ''}"
+        title = f"{count} simulations on {counted(self.workers, 'rank')}"
         return markup.table(title, rows, header)
 
     def disk(self, simulations: int) -> float:

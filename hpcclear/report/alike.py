@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from hpcclear.base.plain import counted
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
@@ -74,7 +75,7 @@ def _listed(names: list[str]) -> str:
     named = [name for name in names if not any(word in name.split() for word in _BOOKKEEPING)]
     shown, more = named[:NAMED], len(names) - len(named[:NAMED])
     if not shown:
-        return f"{more} other design{'s' if more > 1 else ''} of the search"
+        return f"{counted(more, 'other design')} of the search"
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 

@@ -13,6 +13,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import FIELDS, Status
+from hpcclear.base.plain import counted
 from hpcclear.base.student import student
 from hpcclear.base.units import to_si
 from hpcclear.report import bearings
@@ -198,7 +199,7 @@ def _length_of_peaks(samples: Results) -> Iterator[Line]:
     scene = scene_of(samples)
     if scene is not None and scene.numerics.target_error is None:
         count = scene.numerics.averaged_revolutions
-        yield Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")
+        yield Line("peaks", f"largest of {counted(count, 'revolution')}")
 
 
 def _values(samples: Results, name: str) -> Array:

@@ -12,7 +12,7 @@ from pydantic import PrivateAttr, ValidationError
 from hpcclear.base import markup
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.base.outcome import record_type
-from hpcclear.base.plain import plain as printable
+from hpcclear.base.plain import counted, plain as printable
 from hpcclear.base.units import is_written_in, noting
 from hpcclear.base.written import Reading, Texts, reading
 from hpcclear.plugins.sources import using
@@ -138,7 +138,7 @@ class Scene(ConsistentTables):
         """What is simulated, in a line: "Scene(slider-crank, 2 joints with clearance, study of 8 variables, 3f2a...)"."""
         parts: list[str] = [self.mechanism.kind]
         if count := len(self.clearance_joints()):
-            parts.append(f"{count} joint{'s' * (count > 1)} with clearance")
+            parts.append(f"{counted(count, 'joint')} with clearance")
         if self.study is not None:
             parts.append(f"study of {', '.join(self.study.names[:8]) or 'random inputs'}")
         return f"Scene({'; '.join(parts)}; hash {self.hash[:16]})"

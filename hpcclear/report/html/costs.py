@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hpcclear.base.plain import counted
 from hpcclear.report import targets
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, PageTable, folded
@@ -55,8 +56,7 @@ def cheapest(here: Results) -> str:
     seconds = float(here["cheapest_seconds"])
     if not np.isfinite(seconds):
         return "not resolved by the measured revolutions"
-    spent = int(here["cheapest_revolutions"])
-    count = f"{spent} revolution{'s' if spent > 1 else ''}"
+    count = counted(int(here["cheapest_revolutions"]), "revolution")
     return f"rtol {float(here['cheapest_tolerance']):.0e}, {count}, {seconds:.2g} s"
 
 

@@ -56,7 +56,7 @@ class _Entity(NamedTuple):
         """Places of a code of x, such as 10; y has the code that is 10 higher."""
         x, y = ([v for one, v in self.pairs if one == c] for c in (code, code + 10))
         if len(x) != len(y):
-            file.refuse(self.kind, "has a place that cannot be read", "Save the drawing again")
+            file.refuse(self.kind, "has a place that cannot be read")
         what = f"a place of {self.kind[:40]}"
         return [(file.number(a, what), file.number(b, what)) for a, b in zip(x, y, strict=True)]
 
@@ -218,8 +218,7 @@ def _add(body: _Body, one: _Entity, file: File) -> None:
     if one.kind == "LINE":
         places += one.places(11, file)
     if not places or (one.kind == "LINE" and len(places) != 2):
-        reason = "has no place, or an end too many or too few"
-        file.refuse(one.kind, reason, "Save the drawing again")
+        file.refuse(one.kind, "has no place, or an end too many or too few")
     if "POLYLINE" in one.kind and int(file.number(one.text(70) or "0", "a flag of a polyline")) & 1:
         places = [*places, places[0]]
     body.points += places
