@@ -194,8 +194,7 @@ def _study_rows(scene: Scene) -> Iterator[tuple[str, str]]:
     for row in study.worn:
         from hpcclear.study import lives
 
-        assert scene.wear is not None  # by validation
-        text = f"clearance after {row.cycles:g} revolutions of {scene.wear.lives} service lives, "
+        text = f"clearance after {row.cycles:g} revolutions of {scene.required_wear.lives} service lives, "
         text += f"simulated first (about {lives.simulations(scene)} simulations)"
         yield f"{row.name} random", text
 

@@ -24,10 +24,10 @@ LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 
 def ages_of(scene: Scene, lives: list[Life]) -> Array:
     """Revolutions (n,) of the curves: evenly to the end of the longest life, and where random inputs of the study are taken."""
-    assert scene.wear is not None
-    longest = max(one.ended for one in lives) or scene.wear.cycles
+    wear = scene.required_wear
+    longest = max(one.ended for one in lives) or wear.cycles
     asked = [] if scene.study is None else [row.cycles for row in scene.study.worn]
-    return np.union1d(np.linspace(0.0, longest, scene.wear.points), np.array(asked, float))
+    return np.union1d(np.linspace(0.0, longest, wear.points), np.array(asked, float))
 
 
 def revolution_times(scene: Scene, inputs: Points) -> Array:
@@ -41,8 +41,7 @@ def revolution_times(scene: Scene, inputs: Points) -> Array:
 
 def relief_of(scene: Scene) -> Relief:
     """What profiles of wear are made of."""
-    assert scene.wear is not None
-    return Relief(**scene.waves()) if scene.wear.waves else FLAT
+    return Relief(**scene.waves()) if scene.required_wear.waves else FLAT
 
 
 def lives_dataset(
@@ -54,10 +53,10 @@ def lives_dataset(
     even: list[Life] | None = None,
 ) -> Results:
     """Lives and their statistics as a dataset of kind ``wear``; `even`: the same worn evenly, where profiles were followed."""
-    assert scene.wear is not None
     cycles, relief = ages_of(scene, [*lives, *(even or ())]), relief_of(scene)
-    angles = np.linspace(0.0, 2.0 * np.pi, scene.wear.bins, endpoint=False)
-    limits = scene.wear.limit.given()
+    wear = scene.required_wear
+    angles = np.linspace(0.0, 2.0 * np.pi, wear.bins, endpoint=False)
+    limits = wear.limit.given()
     found = [curves(one, joints[k], cycles, relief, angles) for k, one in enumerate(lives)]
     last = [curves(one, joints[k], np.array([one.ended]), relief) for k, one in enumerate(lives)]
     ends = np.array([lifetime(one, joints[k], limits, relief) for k, one in enumerate(lives)])
@@ -91,7 +90,7 @@ def lives_dataset(
         "random_input": np.array(inputs.names, dtype=str),
     } | ({} if even is None else {"angle": angles})  # fmt: skip
     bounds = {f"limit_{name}": value for name, value in limits.items()}
-    attrs = {**attributes, "tolerance": scene.wear.tolerance, **bounds}
+    attrs = {**attributes, "tolerance": wear.tolerance, **bounds}
     return dataset.dataset("wear", coords, data, attrs, inputs.units, scene.objective, inputs.words)
 
 

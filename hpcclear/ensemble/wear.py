@@ -40,18 +40,16 @@ PERTURBATION = 1e-9
 
 def check_worn(scene: Scene) -> None:
     """Refuse a scene that has no lives to follow. Raises InputError."""
-    if scene.wear is None:
-        remedy = "Add [wear], as in jobs/wear.toml"
-        raise InputError("wear", None, "the scene has no [wear] table", remedy)
+    wear = scene.required_wear
     if not scene.worn_joints():
         remedy = "Give one a table wear, as in jobs/wear.toml"
         raise InputError("joints", None, "no joint of the scene wears", remedy)
     alike = scene.study is None or not of_lives(scene).required_study.random
-    if scene.wear.lives > 1 and alike:
+    if wear.lives > 1 and alike:
         reason = "without random inputs all service lives are the same"
         remedy = "Add [study.random], or simulate one service life"
-        raise InputError("wear.lives", scene.wear.lives, reason, remedy)
-    if scene.study is not None and scene.study.worn and scene.wear.lives == 1:
+        raise InputError("wear.lives", wear.lives, reason, remedy)
+    if scene.study is not None and scene.study.worn and wear.lives == 1:
         reason = "one service life gives no distribution of clearances"
         raise InputError("wear.lives", 1, reason, "Simulate more, such as 100")
     named = [row.name for row in scene.study.random] if scene.study is not None else []
@@ -66,7 +64,6 @@ def check_worn(scene: Scene) -> None:
 
 def _check_bounds(scene: Scene) -> None:
     """Refuse lives that are over when new, and a limit that no joint can reach."""
-    assert scene.wear is not None
     deepest = {}
     for name in scene.worn_joints():
         key = f"{scene.joint_key(name)}.clearance"
@@ -75,7 +72,7 @@ def _check_bounds(scene: Scene) -> None:
             reason = f"a bearing counts as worn through from {DEEPEST:g} of its radius on"
             reason = f"{reason}, {scene.shown(key, deepest[key])}"
             raise InputError(key, scene.shown(key), reason, "Lower it")
-    limit, most = scene.wear.limit.clearance, max(deepest.values())
+    limit, most = scene.required_wear.limit.clearance, max(deepest.values())
     if limit is None:
         return
     least = joints_of(scene, inputs_of(scene)).clearance.max(axis=1).min()
@@ -88,7 +85,7 @@ def _check_bounds(scene: Scene) -> None:
 
 
 def of_lives(scene: Scene) -> Scene:
-    """The scene without inputs that its lives are to notify: their clearances are new ones, with what scatter these have."""
+    """The scene without inputs that its lives are to give: their clearances are new ones, with what scatter these have."""
     if scene.study is None or not scene.study.worn:
         return scene
     changes: dict[str, object] = {"study.cases": {}}
@@ -100,10 +97,10 @@ def of_lives(scene: Scene) -> Scene:
 
 def inputs_of(scene: Scene) -> Points:
     """Random inputs of every life, a row each; no columns for a single one, which is the scene as it stands."""
-    assert scene.wear is not None
-    if scene.wear.lives == 1:
+    lives = scene.required_wear.lives
+    if lives == 1:
         return Points((), np.empty((1, 0)), ())
-    return monte_carlo(of_lives(scene), scene.wear.lives, design={}, purpose="wear")
+    return monte_carlo(of_lives(scene), lives, design={}, purpose="wear")
 
 
 class States:
@@ -148,10 +145,10 @@ def follow(
     scene: Scene, states: States, ranks: Ranks, checkpoint: Checkpoint, style: Style = "quiet", first: int = 0
 ) -> list[Life]:  # fmt: skip
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
-    assert scene.wear is not None
+    wear = scene.required_wear
     plan = LifePlan(
-        scene.wear.cycles, scene.wear.tolerance, float(scene.numerics.averaged_revolutions), scene.wear.copies,
-        scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
+        wear.cycles, wear.tolerance, float(scene.numerics.averaged_revolutions), wear.copies,
+        wear.most_copies, wear.limit.given(), wear.beyond_limit,
     )  # fmt: skip
     relief, joints = relief_of(scene), states.joints
     worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]

@@ -148,7 +148,7 @@ def trusted(lines: Iterable[Trust], outside: bool = False) -> tuple[Trust, ...]:
     return tuple(found)
 
 
-def percent(share: float) -> str:
+def plus_minus(share: float) -> str:
     """Return a half-width relative to its value, in words, rounded up to two digits; "" where it is not known or zero."""
     if not np.isfinite(share):
         return ""
@@ -190,5 +190,5 @@ def within(value: float, low: float, high: float, unit: str) -> str:
     if not np.isfinite([value, low, high]).all():
         return "interval not known"
     if value and (high - low) < abs(value):
-        return percent((high - low) / 2.0 / abs(value))
+        return plus_minus((high - low) / 2.0 / abs(value))
     return labels.stated(value, low, high, unit)[1] if low < high else ""

@@ -72,6 +72,14 @@ class SceneTables(Table):
         return self.study
 
     @property
+    def required_wear(self) -> Lives:
+        """The wear of a scene that needs it; raises InputError if it has none."""
+        if self.wear is None:
+            remedy = "Add [wear], as in jobs/wear.toml"
+            raise InputError("wear", None, "the scene has no [wear] table", remedy)
+        return self.wear
+
+    @property
     def objective(self) -> Objective:
         """What each sample is judged by: the study's objective, f where there is no study."""
         named = self.numerics.objective if self.study is None else self.study.objective

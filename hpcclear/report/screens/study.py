@@ -39,7 +39,7 @@ from hpcclear.report.screen import (
     change,
     green,
     lower,
-    percent,
+    plus_minus,
     red,
     trusted,
     upper,
@@ -277,7 +277,7 @@ def _accuracy(best: Results) -> Trust:
     for stem in ("mean", "deviation"):
         value, low, high = labels.estimate(best, stem)
         if value and np.isfinite([low, high]).all():
-            known.append(f"{_USUAL[stem]} {percent((high - low) / 2.0 / abs(value))}")
+            known.append(f"{_USUAL[stem]} {plus_minus((high - low) / 2.0 / abs(value))}")
     if not known:
         return amber("Intervals of mean and standard deviation are not known", "quality")
     return green(f"Accuracy: {', '.join(known)}", "quality")
