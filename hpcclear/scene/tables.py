@@ -134,7 +134,8 @@ class SceneTables(Table):
 
     @property
     def bristles(self) -> int:
-        """Contacts whose friction has bristles, each with a state of its own."""
+        """Contacts whose friction has bristles, each with a coordinate of its own before those of the mechanism; a bristle's
+        deflection is the velocity of its coordinate, so that steppers need no other kind of state."""
         return len(self.contact_labels()) if self.effects.friction.declared.bristled else 0
 
     def bending(self) -> dict[str, BarBending]:

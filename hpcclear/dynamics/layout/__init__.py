@@ -67,14 +67,6 @@ class Effects(NamedTuple):
         return None if self.friction is None else self.friction.bristled
 
 
-def bristles_of(effects: Effects) -> int:
-    """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
-
-    A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
-    """
-    return 0 if effects.bristled is None else len(places_of(effects))
-
-
 def places_of(effects: Effects) -> range:
     """Places of the joints with clearance."""
     return range(effects.first, effects.first + effects.joints)
