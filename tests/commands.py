@@ -156,6 +156,12 @@ def result_files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*.nc"))
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    """Bytes of all results by their name, but for the times, which may differ."""
+    paths = [path for path in result_files(folder) if not path.name.endswith("timing.nc")]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
 def check_readable(folder: Path) -> int:
     """Read every file there is; a file that a merge has just removed does not count. Number read."""
     count = 0

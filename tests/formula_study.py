@@ -65,9 +65,3 @@ def on_ranks(scene: Scene, place: Path, *words: object, ranks: int = 2) -> Path:
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
     return place / "out"
-
-
-def contents(place: Path) -> dict[str, bytes]:
-    """Bytes of all results, by their name."""
-    paths = [path for path in sorted(place.rglob("*.nc")) if path.name != "timing.nc"]
-    return {str(path.relative_to(place)): path.read_bytes() for path in paths}

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks
+from commands import contents
+from formula_study import formula, on_ranks
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone

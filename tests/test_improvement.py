@@ -7,7 +7,8 @@ import moocore
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks, scene_of
+from commands import contents
+from formula_study import formula, on_ranks, scene_of
 
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene.domain import box

@@ -13,6 +13,7 @@ import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner
+from commands import contents
 from formula_study import whole as study_scene
 from patience import crowded
 from streaming_run import make_made_up
@@ -105,15 +106,6 @@ FILES: dict[Callable[..., None], str] = {
     effects: "out.nc", simulate: "out.nc", run: "samples.nc", accuracy: "accuracy.nc",
 }  # fmt: skip
 """Each command that writes, and a file that it writes."""
-
-
-def contents(place: Path) -> dict[str, bytes]:
-    found = {str(path.relative_to(place)): path for path in sorted(place.rglob("*.nc"))}
-    return {
-        name: path.read_bytes()
-        for name, path in found.items()
-        if not path.name.endswith("timing.nc")
-    }
 
 
 def planted(path: Path, **attributes: str) -> Path:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import opened
 import pytest
-from commands import MPIEXEC
-from formula_study import PROGRAMS, contents, formula
+from commands import MPIEXEC, contents
+from formula_study import PROGRAMS, formula
 from refusals import refused
 
 from hpcclear.base.errors import InputError

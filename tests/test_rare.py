@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks, scene_of
+from commands import contents
+from formula_study import formula, on_ranks, scene_of
 from margins import at_least, at_most, fewest
 from scipy import stats
 

@@ -6,7 +6,8 @@ from collections import Counter
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks, whole as scene_of
+from commands import contents
+from formula_study import formula, on_ranks, whole as scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
