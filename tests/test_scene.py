@@ -169,16 +169,18 @@ def test_override(override: str, path: str, value: object) -> None:
     assert load_scene(tomllib.loads(scene.text)) == scene
 
 
+@pytest.mark.parametrize(("element", "value"), [("range.1", [0.15, 0.5]), ("range.0", [0.5, 0.6])])
+def test_override_of_an_element_of_a_list(element: str, value: list[float]) -> None:
+    """Counted from 0, as messages name it; an element that a list has not is refused with the whole path."""
+    scene = load_scene(ROBUST, [f"study.variables.m1.{element}=0.5"])
+    assert scene == load_scene(ROBUST, [f"study.variables.m1.range={value}"])
+    with refused("study.variables.m1.range.2"):
+        load_scene(ROBUST, ["study.variables.m1.range.2=0.5"])
+
+
 @pytest.mark.parametrize(
     "override",
-    [
-        "mechanism.rod.mass",
-        "=3",
-        "a b=3",
-        ".x=1",
-        "mechanism..rod=1",
-        "x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x=1",
-    ],
+    ["mechanism.rod.mass", "=3", "a b=3", ".x=1", "mechanism..rod=1", ".".join("x" * 18) + "=1"],
 )
 def test_malformed_override_is_refused(override: str) -> None:
     with refused("--set"):

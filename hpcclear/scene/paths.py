@@ -9,7 +9,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
 from hpcclear.base.holding import holding
 from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import EffectTables
@@ -171,16 +171,31 @@ def described(paths: Sequence[str]) -> str:
     return alike.pop() if len(paths) > 1 and len(alike) == 1 else " and ".join(found)
 
 
+def _elements(listed: list[object], path: str, value: object) -> Tables:
+    head, key = path.split(".")[:2]
+    names = "xy" if key in ("x", "y") and len(listed) == 2 else map(str, range(len(listed)))
+    rows = dict(zip(names, listed, strict=True))
+    if key.isdigit() and key not in rows:
+        remedy = f"Use 0 to {len(listed) - 1}, or write the whole list in [ ]"
+        raise InputError(path, value, f"{head} is a list and has no {key}", remedy)
+    return rows if key in rows else {}
+
+
 def replace(content: Tables, path: str, value: object) -> Content:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
-    What is not a table on the way to it is replaced by one; the model then says what is wrong with that.
+    Elements of a list count from 0, as messages name them; x and y are those of a pair. What is neither table nor list on
+    the way is replaced by a table; the model then says what is wrong. Raises InputError if a list has no such element.
     """
     head, _, rest = path.partition(".")
     copy = dict(content)
     if rest:
         inner = copy.get(head)
-        copy[head] = replace(inner if isinstance(inner, Mapping) else {}, rest, value)
+        listed = _elements(inner, path, value) if isinstance(inner, list) else {}
+        rows = inner if isinstance(inner, Mapping) else listed
+        with at(head):
+            made = replace(rows, rest, value)
+        copy[head] = list(made.values()) if listed else made
     elif value is None:
         copy.pop(head, None)
     else:
