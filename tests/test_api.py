@@ -40,6 +40,8 @@ def test_evaluate_takes_paper_names_and_paths():
         (["140 g"], "'140 g'"),
         ([0.1, 0.2, 0.3], "mismatch"),
         (np.ma.array([0.1, 0.2], mask=[0, 1]), "finite"),
+        ([True, False], "truth values"),
+        ([0.1 + 1j, 0.2], "complex"),
     ],
 )
 def test_columns_that_are_no_designs_are_refused(column, reason):
@@ -58,6 +60,8 @@ def test_evaluate_refuses_what_makes_no_mechanism():
         hpcclear.evaluate(scene, {})
     with pytest.raises(InputError, match="not a number of this scene"):
         hpcclear.evaluate(scene, {"drive.spead": 1.0})
+    with pytest.raises(InputError, match="Did you mean 'C'"):
+        hpcclear.evaluate(scene, {"c": [3e-4]})
     with pytest.raises(InputError, match=r"'C, C12': two columns drive joints\.crank_rod"):
         hpcclear.evaluate(scene, {"C": [3e-4], "C12": [5e-4]})
     pins = (f"joints.{name}.kind=ideal" for name in ("crank_rod", "rod_slider"))

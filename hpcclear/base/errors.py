@@ -87,9 +87,10 @@ def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
     from difflib import get_close_matches
 
-    close = get_close_matches(word[:80], words, n=3, cutoff=0.6)
+    close = [one for one in words if one.lower() == word.lower()]
+    close += get_close_matches(word[:80], words, n=3, cutoff=0.6)
     # whoever writes the beginning of a name means it
-    close.sort(key=lambda one: not one.startswith(word))
+    close.sort(key=lambda one: not one.lower().startswith(word.lower()))
     if close:
         return f"Did you mean {close[0]!r}?"
     if not words:

@@ -34,10 +34,8 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
         raise InputError("points", {}, "no entry is varied", "Give a name and its values")
     names = tuple(map(str, given))
     try:
-        columns: list[ArrayLike] = [
-            np.ma.filled(np.ma.asarray(x, float), np.nan) for x in given.values()
-        ]
-        values = np.column_stack(np.broadcast_arrays(*map(np.atleast_1d, columns)))
+        columns = [np.atleast_1d(_numbers(x)) for x in given.values()]
+        values = np.column_stack(np.broadcast_arrays(*columns))
     except ValueError as error:
         remedy = "Give numbers in SI, one or as many as the others have, for each name"
         raise InputError("points", list(given), str(error).removesuffix("."), remedy) from None
@@ -51,6 +49,13 @@ def as_points(scene: Scene, points: Points | Mapping[str, ArrayLike]) -> Points:
     check_apart("points", "columns", names, made.paths)
     check_points(scene, made)
     return made
+
+
+def _numbers(given: ArrayLike) -> np.ndarray:
+    found: np.ma.MaskedArray = np.ma.asarray(given)
+    if found.dtype.kind in "bc":  # numpy would take true for 1, and drop the imaginary part
+        raise ValueError("truth values and complex numbers are no real numbers")
+    return np.ma.filled(found.astype(float), np.nan)
 
 
 def paths_of(scene: Scene, name: str) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ def axis(scene: Scene, words: str, option: str = "--x") -> tuple[str, tuple[str,
     if found is None:
         example = 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
         raise InputError(option, words, "is not PATH=LO:HI:N with N up to 9999", example)
-    name, *ends, count = found.groups()
+    name, *ends, count = map(str.strip, found.groups())
     paths = paths_of(scene, name)
     bounds = range_of(option, words, ends, scene.unit(paths[0]))
     return name, paths, np.linspace(*bounds, int(count))
@@ -111,4 +111,4 @@ def run_map(
         with saving(checkpoint.flush):
             return session.write(samples_of(scene, points, records, attributes, MEAN_GAP))
 
-    return Session(place, key, ranks, options).finished("samples", make)
+    return Session(place, key, ranks, options).finished(make)

@@ -34,7 +34,7 @@ class Unknown:
     @classmethod
     def of(cls, scene: Scene, words: str) -> "Unknown":
         """Return that of ``PATH=LO:HI``; raises InputError where the words are another thing."""
-        name, _, rest = words.partition("=")
+        name, rest = map(str.strip, words.partition("=")[::2])
         ends = rest.split(":")
         if not name or len(ends) != 2:
             remedy = "For example joints.crank_rod.clearance=10um:150um"

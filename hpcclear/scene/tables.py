@@ -303,7 +303,8 @@ class SceneTables(Table):
     def number(self, path: str) -> float:
         """The physical number at a dotted path, SI; raises InputError if the scene has no number there."""
         if path not in self._numbers:
-            remedy = nearest(path, self.numeric_paths())
+            short = [one for one, paths in SHORT_NAMES.items() if self._numbers.keys() & {*paths}]
+            remedy = nearest(path, (*self.numeric_paths(), *short))
             raise InputError("path", path, "is not a number of this scene", remedy)
         return self._numbers[path]
 
