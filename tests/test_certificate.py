@@ -399,6 +399,7 @@ IDEAL = ("joints.crank_rod.kind=ideal", "joints.rod_slider.kind=ideal")
             "peak-crank-moment",
         ),
         (["--samples", "3"], "--samples"),
+        (["-o", "one.nc", "--scene", "x/../one.nc"], "--output names this file too"),
     ],
 )  # fmt: skip
 def test_bad_words_end_with_2(tmp_path, words, found):

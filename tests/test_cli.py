@@ -188,6 +188,7 @@ def test_what_a_killed_command_left_goes_when_it_runs_again(tmp_path, monkeypatc
         ([*SAMPLE, "--time-limit", "nan"], "--time-limit"),
         ([*SAMPLE, "--statistics", "--points", "p.csv"], "--points"),
         ([*SAMPLE, "--raw", "x"], "--raw"),
+        (["export", "x.nc", "-o", "x.csv", "--beyond", "f=1"], "--beyond needs --statistics"),
         ([*SAMPLE, "--checkpoint-interval", "nan"], "-interval"),
         (["chekc"], "No such command 'chekc'. Did you mean 'check'?"),
         ([*SAMPLE, "--points", "README.md"], "README.md"),

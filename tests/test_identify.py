@@ -546,6 +546,6 @@ def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
     again = CliRunner().invoke(cli, words, standalone_mode=False)
     assert again.exception is None
     assert place.read_bytes() == before
-    other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
+    other = CliRunner().invoke(cli, [*words, "--noise", "10%"], standalone_mode=False)
     assert other.exit_code == 2
     assert "another run" in " ".join(other.output.split())

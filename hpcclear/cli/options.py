@@ -78,6 +78,19 @@ class Amount(click.FloatRange):
         return number
 
 
+class Share(Amount):
+    """A relative amount: 0.01, or 1%."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number, or raise BadParameter."""
+        words = str(value).strip()
+        with contextlib.suppress(ValueError):  # else the words are refused as they are
+            value = float(words.removesuffix("%")) / (100 if words.endswith("%") else 1)
+        return super().convert(value, param, ctx)
+
+
 TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
 SET = option("--set KEY.PATH=VALUE", "Override an entry of the file. Repeatable.", name="overrides")

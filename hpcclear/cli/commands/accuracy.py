@@ -17,7 +17,7 @@ from hpcclear.cli import loaded, options as cli
 @cli.option(
     "--error RELATIVE",
     "With --plan, target error of the objective, relative. By default the settings of the file are used.",
-    type=cli.Amount(0.0, 0.5, min_open=True),
+    type=cli.Share(0.0, 0.5, min_open=True),
 )
 @cli.option(
     "--ranks N", "With --plan, number of ranks to plan for. By default those of this run.",

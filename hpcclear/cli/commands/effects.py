@@ -1,6 +1,5 @@
 """`effects`: which effects of a scene can be neglected."""
 
-from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -13,8 +12,9 @@ from hpcclear.cli import loaded, options as cli
 @cli.with_scene
 @cli.output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @cli.option(
-    "--tolerance CHANGE", "Largest relative change of the results that counts as negligible.", "1%"
-)
+    "--tolerance CHANGE", "Largest relative change of the results that counts as negligible.", "1%",
+    type=cli.Share(0.0, 1.0, min_open=True, max_open=True),
+)  # fmt: skip
 @cli.option(
     "--samples N",
     "Largest number of samples of a variant. By default a twentieth of the study's simulations is spent.",
@@ -28,7 +28,7 @@ from hpcclear.cli import loaded, options as cli
 def run(
     written: cli.Written,
     output: Path | None,
-    tolerance: str,
+    tolerance: float,
     samples: int | None,
     forces: bool,
     reduced: Path | None,
@@ -48,26 +48,17 @@ def run(
         from hpcclear.ensemble.trial import Wanted
         from hpcclear.study.stages import certificate_extent
 
-        allowed = tolerance_of(tolerance)
+        output = output or Path(f"{written.file.stem}-effects.nc")
         if reduced is not None:
             cli.check_free(reduced)
-        wanted = Wanted(allowed, *certificate_extent(scene, samples), forces)
-        place = cli.place_of(output or Path(f"{written.file.stem}-effects.nc"))
+            if reduced.resolve() == output.resolve():
+                reason = "--output names this file too"
+                raise InputError("--scene", str(reduced), reason, "Choose another name")
+        wanted = Wanted(tolerance, *certificate_extent(scene, samples), forces)
+        place = cli.place_of(output)
         found = run_effects(scene, place, ranks, how.options(), wanted)
         describe_run(found, "effects")
         if reduced is not None:
             from hpcclear.results import files
 
             files.write_bytes(cli.place_of(reduced), found.content.attrs["reduced_scene"].encode())
-
-
-def tolerance_of(words: str) -> float:
-    """A relative change: 0.01, or 1%. Raises InputError if it is no number."""
-    from hpcclear.base.units import UnitError, to_si  # not for the list of commands
-
-    with suppress(ValueError):
-        return float(words)
-    try:
-        return to_si(words, "")
-    except UnitError as error:
-        raise InputError("--tolerance", words, error.reason, "Write 1%, or 0.01") from None

@@ -40,6 +40,7 @@ def run(
     from hpcclear.report import export as writing
     from hpcclear.report.spread import rows_of, side_by_side
 
+    cli.check_mode("--statistics", statistics, its_own=("beyond",))
     writing.check_format(output)
     if statistics:
         samples = writing.read_samples(files)
@@ -47,7 +48,7 @@ def run(
         made = writing.statistics(samples, cli.place_of(output), lines, units)
         console().print(table("", rows_of(lines), ["statistic", *samples]))
     else:
-        if len(files) > 1 or beyond:
+        if len(files) > 1:
             reason = "a table holds one result"
             remedy = "Add --statistics, or export each by itself"
             raise InputError("export", f"{len(files)} files", reason, remedy)

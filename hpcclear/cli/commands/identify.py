@@ -27,11 +27,11 @@ from hpcclear.ranks.stopping import Exit
 @cli.option("--resonance HZ[:Q]", "Mounting resonance of the sensor and its quality factor.")
 @cli.option(
     "--gain-error SHARE", "Standard deviation of the sensor's calibration factor, relative.",
-    type=cli.Amount(min=0.0), default=0.0,
+    type=cli.Share(min=0.0), default=0.0,
 )  # fmt: skip
 @cli.option("--angle-error ANGLE", "Standard deviation of the angle reference.", default="0 deg")
 @cli.option(
-    "--noise SHARE", type=cli.Amount(min=0.0, min_open=True),
+    "--noise SHARE", type=cli.Share(min=0.0, min_open=True),
     words="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
           "revolutions is used too.",
 )  # fmt: skip
