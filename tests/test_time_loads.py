@@ -135,7 +135,7 @@ def test_a_linkage_that_ran_up_moves_as_one_at_that_speed():
 
 def test_tables_against_the_time_come_from_files(tmp_path):
     (tmp_path / "load.csv").write_text("Zeit [ms];Moment [Nmm]\n0;0\n500;30\n1500;10\n")
-    (tmp_path / "run.csv").write_text("t [s],speed [rpm]\n0,60\n1,120\n")
+    (tmp_path / "run.csv").write_text("t [s],speed [rpm]\n-0.5,60\n0.5,120\n")
     text = """
         format_version = 2
         [mechanism]
@@ -147,6 +147,7 @@ def test_tables_against_the_time_come_from_files(tmp_path):
     """
     (tmp_path / "scene.toml").write_text(text)
     scene = load_scene(tmp_path / "scene.toml")
+    assert ["-0.5 s counts as 0 s" in str(one) for one in scene.readings] == [True, False]
     rows = scene.mechanism.loads[0].torque_by_time
     np.testing.assert_allclose(rows, [[0.0, 0.0], [0.5, 0.03], [1.5, 0.01]])
     np.testing.assert_allclose(

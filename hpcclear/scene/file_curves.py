@@ -130,7 +130,8 @@ def against_time(curve: FileCurve, folder: Path, unit: str, key: str) -> Read:
     _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
     start = times[0] if kind in _MOTIONS else 0.0
     made = np.column_stack([times - start, values]).tolist()
-    since = f", {first.heading} since {first.cells[0]}" if sheet.is_clock(first) else ""
+    since = f", of which {start:.6g} s counts as 0 s" if start else ""
+    since = f", {first.heading} since {first.cells[0]}" if sheet.is_clock(first) else since
     return made, f"{sheet.found}, {counted(len(times), 'row')}{since}"
 
 

@@ -204,7 +204,7 @@ class Sheet:
         listed = ", ".join(one.heading for one in (by_unit or by_name or free))
         listed = listed or "none with numbers"
         reason = f"which column of {self.path} it is does not follow from its headings: {listed}"
-        raise InputError(f"{key}.{kind}", None, reason, f'Name it, as in {kind} = "heading"')
+        raise InputError(key, None, reason, f'Name it, as in {kind} = "heading"')
 
     def column(self, name: str, key: str) -> SheetColumn:
         """The column of that name or heading; InputError says which there are."""
@@ -281,7 +281,9 @@ def unwrapped(angle: Array) -> Array:
 
 
 def plain_unit(unit: str, target: str) -> str:
-    """A unit without the g of gauge pressures, where it is one."""
+    """A unit without the g of gauge pressures, where it is one, or without the sign of a number that has none: [-]."""
+    if not target and unit in ("-", "1"):
+        return ""
     return _GAUGE.sub(r"\1", unit) if target == "Pa" else unit
 
 
