@@ -122,4 +122,4 @@ def run_bifurcation(
         about = session.attributes, points.units, observation.described(short), points.words
         return session.write(dataset.dataset("bifurcation", coords, data, *about))
 
-    return Session(place, key, ranks, options).finished("bifurcation", make)
+    return Session(place, key, ranks, options).finished(make)

@@ -58,7 +58,7 @@ def run_effects(
             variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
             return times_of(trial.seconds(variants))
 
-    return session.finished("effects", lambda here: _certified(trial, plan, here), times)
+    return session.finished(lambda here: _certified(trial, plan, here), times)
 
 
 def _certified(trial: Trial, plan: Screening, session: Session) -> Results:

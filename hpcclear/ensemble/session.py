@@ -110,27 +110,26 @@ class Session:
 
     def finished(
         self,
-        kind: str,
         make: Callable[[Session], Results],
         times: Callable[[Results], Mapping[str, str]] | None = None,
     ) -> Finished:
-        """Return the file of this kind that a command writes: of an earlier run, else what `make` returns and has written.
+        """Return the file that a command writes: of an earlier run, else what `make` returns and has written.
 
         `times`: from new results to what the file of times says of them. Call it instead of entering the context.
         """
         with self:
-            content, measured = self.found(kind), None
+            content, measured = self.found(), None
             if content is None:
                 content = make(self)
                 measured = None if times is None else times(content)
             self.close(measured)
         return Finished(content, self.place.output, self.place.timing)
 
-    def found(self, kind: str) -> Results | None:
+    def found(self) -> Results | None:
         """The file of an earlier run of the same command, if it is there; another run's is refused."""
         if not self.place.output.exists():
             return None
-        content = dataset.read(self.place.output, kind)
+        content = dataset.read(self.place.output)
         check_key(content, self.key, self.place.output)
         return content
 
@@ -318,7 +317,7 @@ def run_sample(
         place = Place.of_file(part.place(output), False)
     chosen = points.take(slice(rows.start, rows.stop))
     session = Session(place, key, ranks, options)
-    return session.finished("samples", lambda here: _simulate(scene, chosen, here, rows.start))
+    return session.finished(lambda here: _simulate(scene, chosen, here, rows.start))
 
 
 def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
@@ -373,7 +372,7 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
     """
     place = Place.of_file(output, False)
     with Session(place, sample_key(scene, points), ranks, Options()) as session:
-        samples = session.found("samples")
+        samples = session.found()
         if samples is None:
             parts = [_records(part, scene, points, output) for part in whole(output)]
             records = np.concatenate(parts)

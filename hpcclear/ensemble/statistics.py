@@ -76,7 +76,7 @@ def run_statistics(
     layout = f"{len(points)} in blocks of {BLOCK}, {BINS} bins"
     key = {**run_key(scene, "sample --statistics"), "statistics": layout}
     with Session(place, key, ranks, options) as session, _keeping(raw, session) as folder:
-        content = session.found("statistics")
+        content = session.found()
         blocks = range(-(-len(points) // BLOCK))
         if content is not None and folder is not None and (gone := _missing(folder, blocks)):
             reason = f"the statistics exist, in {place.output}, but the samples were not kept ({gone[0]} is missing)"

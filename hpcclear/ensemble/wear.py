@@ -228,4 +228,4 @@ def run_wear(
         with saving(checkpoint.flush):
             return session.write(lives_dataset(scene, inputs, *about))
 
-    return Session(place, run_key(scene, "wear"), ranks, options).finished("wear", make)
+    return Session(place, run_key(scene, "wear"), ranks, options).finished(make)

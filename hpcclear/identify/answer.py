@@ -51,9 +51,7 @@ def run_identify(
     place = Place.of_file(output, options.fresh)
     key = {**run_key(scene, "identify"), **settings.key()}
     session = Session(place, key, ranks, options)
-    return session.finished(
-        "identify", lambda here: _identified(scene, inputs, times, here, settings)
-    )
+    return session.finished(lambda here: _identified(scene, inputs, times, here, settings))
 
 
 def _identified(

@@ -300,7 +300,9 @@ def read(
     content = netcdf.load(place)
     fault = fault_of(content, kind)
     if fault is not None:
-        raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")
+        raise InputError(
+            "file", str(place), fault, f"Name a file of {kind or 'results'} that hpcclear wrote"
+        )
     found = content.attrs.get("scene_hash")
     if scene_hash is not None and found != scene_hash:
         reason = f"it was made from another scene (hash {str(found)[:12]}, not {scene_hash[:12]})"
