@@ -71,6 +71,7 @@ SLIPS = {
     "{key} = {{ a = {number}, b = 1 }}": ("comma", "{key} = {{ a = {point}, b = 1 }}"),
     "{key} = {point};": ("after the value", "{key} = {point}"),
     "{key} =": ("no value", "{key} = value"),
+    "{key}.kürbel = {point}": ("letters beyond a to z", "a to z"),
     "{key} = 1\n{key} = 2": ("twice, first in line", "Keep one"),
     "[other": ("bracket", "[other]"),
     "other]": ("bracket", "[other]"),

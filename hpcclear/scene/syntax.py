@@ -107,6 +107,8 @@ def fault(text: str, error: ValueError) -> tuple[str, str]:
                 return f"{read} has {' and '.join(names)}", f"Write {written.strip()}"
     if re.fullmatch(rf"\s*{_NAME}\s*=?\s*", line):
         return f"{read} has no value", f"Write {line.strip(' =')} = value, or remove the line"
+    if not _STRING.sub("", line).partition("#")[0].partition("=")[0].isascii():
+        return f"{read} has letters beyond a to z in a name", "Use letters a to z, digits and _"
     said = re.sub(r" \(at .*", "", str(error))
     return f"{read} is not valid TOML: {said}", "Write key = value, and text in quotation marks"
 

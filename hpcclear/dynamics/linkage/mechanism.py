@@ -132,7 +132,9 @@ def _names(m: Mechanism) -> None:
     for key, one in _records(m):
         if not _NAME.fullmatch(one.name) or one.name == GROUND:
             reason = "is not a valid name"
-            raise InputError(key, one.name, reason, "Use letters, digits and _, and not 'ground'")
+            raise InputError(
+                key, one.name, reason, "Use letters a to z, digits and _, and not 'ground'"
+            )
         if "center" in getattr(one, "points", ()):
             reason = "is reserved for the mass centre"
             remedy = "Give the point another name"
