@@ -85,9 +85,10 @@ class Share(Amount):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         """Return the number, or raise BadParameter."""
-        words = str(value).strip()
+        from hpcclear.base.units import to_si  # not for the list of commands
+
         with contextlib.suppress(ValueError):  # else the words are refused as they are
-            value = float(words.removesuffix("%")) / (100 if words.endswith("%") else 1)
+            value = to_si(str(value), "")
         return super().convert(value, param, ctx)
 
 
