@@ -38,6 +38,10 @@ from hpcclear.statistics.search.beliefs import LIKELY, Beliefs, Space
 EXPLORED = 5
 """One new design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
 
+UNSURE = 2.0
+"""What is not known of a new design over what models say: their length scales and trends are estimates, and where these are
+wrong no design would show it."""
+
 WIDE, STEPS, LOCAL, CENTRES = 512, (0.2, 0.06, 0.02, 0.006), 64, 2
 """Candidates all over the box, and about each of the best designs at each of these parts of the ranges."""
 
@@ -160,7 +164,7 @@ def _merit(beliefs: Beliefs, direction: Array | None) -> Merit:
     errors = beliefs.noise
 
     def function(points: Array) -> Array:
-        mean, deviation = beliefs.means(points), np.sqrt(beliefs.apart(points, best))
+        mean, deviation = beliefs.means(points), UNSURE * np.sqrt(beliefs.apart(points, best))
         if direction is not None:
             own, spread = mean @ direction, np.sqrt(deviation**2 @ direction**2)
             error = np.sqrt(errors @ direction**2)
