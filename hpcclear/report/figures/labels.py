@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.holding import holding
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
 from hpcclear.base.units import factor
 from hpcclear.base.written import Texts, other_unit, reading, text_of
+from hpcclear.report.html.content import scene_in
 from hpcclear.results.content import Results, Variable, number_in, text_in
 from hpcclear.results.names import DESIGN_VARIABLES
-from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.paths import described
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -54,10 +53,8 @@ class Scale(NamedTuple):
 @contextmanager
 def in_units_of(text: str) -> Iterator[None]:
     """Within it, quantities are shown as the text of a scene has them, others in its units."""
-    texts = Texts()
-    with suppress(InputError):
-        texts = scene_of_text(text, "scene").written if text else texts
-    with reading(texts):
+    scene = scene_in(text)
+    with reading(Texts() if scene is None else scene.written):
         yield
 
 

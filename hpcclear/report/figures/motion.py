@@ -62,8 +62,8 @@ def steady(response: Results, revolutions: int | None = None) -> Results:
     """The last whole revolutions of a response, both ends included: half of them by default, what stands before counts as the
     transient. Raises InputError if the response holds fewer revolutions."""
     angle = turns(response)
-    last = _passages(response)[1]
-    whole = whole_turns(response)
+    first, last = _passages(response)
+    whole = last - first
     count = max(1, (whole + 1) // 2) if revolutions is None else revolutions
     if count < 1 or count > whole:
         reason = f"the response has {whole} whole revolutions"

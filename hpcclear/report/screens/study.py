@@ -12,20 +12,11 @@ from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Status
 from hpcclear.base.plain import counted
 from hpcclear.base.verdict import Verdict
-from hpcclear.report import alike, answer, bearings, scatter
+from hpcclear.report import alike, answer, bearings, merit, scatter
 from hpcclear.report.answer import FAR, MANY, beyond_hertz
 from hpcclear.report.constraints import WORDS, constraints_of, verdict_of
 from hpcclear.report.figures import fits, labels
 from hpcclear.report.html.content import Content, scene_of
-from hpcclear.report.merit import (
-    any_counts,
-    baseline_of,
-    best_of,
-    goals_of,
-    is_plain,
-    ours_of,
-    usual_of,
-)
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
     TILES,
@@ -65,14 +56,18 @@ _INFEASIBLE = {
 
 def screen(verified: Results, content: Content) -> Screen | None:
     """Return the first screen of a verified study; None where nothing was verified."""
-    if not any_counts(verified):
+    if not merit.any_counts(verified):
         return None
-    ours = ours_of(verified)
-    best, base = best_of(ours), baseline_of(ours)
+    ours = merit.ours_of(verified)
+    best, base = merit.best_of(ours), merit.baseline_of(ours)
     of = Recommended(content.files, ours, best)
     kept = base is not None and text_in(base, "design") == text_in(best, "design")
     today = None if kept else base
-    aims = [] if is_plain(best) else [text_in(best, f"{name}_goal") for name in goals_of(best)]
+    aims = (
+        []
+        if merit.is_plain(best)
+        else [text_in(best, f"{name}_goal") for name in merit.goals_of(best)]
+    )
     tiles = sorted(_tiles(best, today, content), key=lambda one: one.label not in aims)
     bars, causes = _bars(of)
     if infeasible := verdict_of(best) in _INFEASIBLE:
@@ -135,9 +130,9 @@ def _about(of: Recommended) -> Iterator[str]:
 
 def _statistics(best: Results) -> dict[str, str]:
     """Words of the values that are shown, and their stems: what the case makes small, then what every design has."""
-    asked = [] if is_plain(best) else goals_of(best)
+    asked = [] if merit.is_plain(best) else merit.goals_of(best)
     usual = {Usual.MEAN: "mean", Usual.DEVIATION: "deviation"}
-    shown = {usual.get(usual_of(best, name), name) for name in asked}
+    shown = {usual.get(merit.usual_of(best, name), name) for name in asked}
     found = {text_in(best, f"{name}_goal"): name for name in asked}
     for stem, words in _USUAL.items():
         if stem not in shown and (stem in best or f"{stem}_true" in best):
