@@ -156,17 +156,15 @@ def main(arguments: list[str] | None = None) -> None:
             code = _refused(error)
         except (click.Abort, KeyboardInterrupt):
             code = Exit.STOPPED
-        except (InputError, StorageError) as error:
-            say(f"Error: {error}")
-            code = Exit.BAD_INPUT if isinstance(error, InputError) else Exit.FAILED
         except LimitError as error:
             end_job(f"Error: {error}", Exit.FAILED)
             code = Exit.FAILED
         except BrokenPipeError:  # the reader of a pipe has seen enough
             sys.stderr.close()
             code = Exit.DONE
-        except (MemoryError, OSError, ImportError, SystemError) as error:
-            known = mendable(error)
+        except (InputError, StorageError, MemoryError, OSError, ImportError, SystemError) as error:
+            ours = isinstance(error, InputError | StorageError)
+            known = error if ours else mendable(error)
             if known is None:
                 raise
             say(f"Error: {known}")

@@ -13,9 +13,6 @@ from hpcclear.cli.terminal import show_rows
 from hpcclear.ranks.progress import duration
 from hpcclear.ranks.terminal import WIDTH
 
-ON_SCREEN = "memory"
-"""Need of a job that is printed without ``--details``; its time is in the table above."""
-
 RESERVE = 1.5
 """Requested wall time over expected wall time."""
 
@@ -49,7 +46,8 @@ def describe(plan: Plan, file: str, error: float | None) -> None:
     title = f"{command}: {about}{plan.simulations} simulations on {counted(plan.workers, 'rank')}"
     header = ("error of f", "settings", "ms/sample", "core-h", "wall time")
     out.print(table(title, rows, header))
-    show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == ON_SCREEN])
+    # without --details the memory alone: the time stands in the table above
+    show_rows("The job", [one for one in _needs(plan, row) if detailed() or one[0] == "memory"])
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row):
         out.print(line, markup=False, soft_wrap=True)
