@@ -25,7 +25,6 @@ from hpcclear.identify.training import Ensemble, ensemble_of, prepared_scene
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
-from hpcclear.results.kinds.identify import with_units
 from hpcclear.results.places import Place
 from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
@@ -147,7 +146,14 @@ def identified(
         **attributes, "members": len(ensemble.places), "failed_members": ensemble.failed,
         **({} if limit is None else {"limit": limit}),
     }  # fmt: skip
-    return with_units(dataset.dataset("identify", coords, data, further), units)
+    content = dataset.dataset("identify", coords, data, further)
+    common = units[0] if len(set(units)) == 1 else "1"  # as ``unit`` has them where they differ
+    for name in ("prior_lower", "prior_upper", "interval", "expected_half_width"):
+        if name in content:
+            content[name].attrs["units"] = common
+    if "rate" in content:
+        content["rate"].attrs["units"] = "1/s" if common == "1" else f"{common}/s"
+    return content
 
 
 def _of_records(

@@ -1,8 +1,5 @@
 """Unknowns of a machine from measured signals."""
 
-from collections.abc import Sequence
-
-from hpcclear.results.content import Results
 from hpcclear.results.rows import ResultKind, count, flag, number, text
 
 KIND = ResultKind(
@@ -40,16 +37,4 @@ KIND = ResultKind(
         "expected_correlation": number("candidate revolutions", "1", "largest correlation of the errors of two unknowns"),
     },
 )
-"""Unknowns are clearances as a rule; where they have another unit, `with_units` writes it."""
-
-OF_UNKNOWNS = ("prior_lower", "prior_upper", "interval", "expected_half_width", "rate")
-
-
-def with_units(content: Results, units: Sequence[str]) -> Results:
-    """Return results with the common unit of its unknowns; with none where they differ, as ``unit`` has them."""
-    common = units[0] if len(set(units)) == 1 else "1"
-    for name in OF_UNKNOWNS:
-        if name in content:
-            unit = common if name != "rate" else "1/s" if common == "1" else f"{common}/s"
-            content[name].attrs["units"] = unit
-    return content
+"""Unknowns are clearances as a rule; where they have another unit, `hpcclear.identify.answer` writes it."""
