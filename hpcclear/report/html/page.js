@@ -7,21 +7,19 @@
   const byId = (id) => document.getElementById(id);
   const called = (name) => name === "original" ? "baseline" : name === content.front.recommended ? `${content.front.role} (${name})` : name;
 
-  function draw(parent, name, attributes = {}, text = null) {
-    const element = document.createElementNS(SVG, name);
+  function set(element, attributes) {
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  }
+
+  function append(parent, element, attributes, text) {
+    set(element, attributes);
     if (text !== null) element.textContent = text;
     parent.append(element);
     return element;
   }
 
-  function put(parent, name, text = null, attributes = {}) {
-    const element = document.createElement(name);
-    if (text !== null) element.textContent = text;
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-    parent.append(element);
-    return element;
-  }
+  const draw = (parent, name, attributes = {}, text = null) => append(parent, document.createElementNS(SVG, name), attributes, text);
+  const put = (parent, name, text = null, attributes = {}) => append(parent, document.createElement(name), attributes, text);
 
   function ticks(low, high, count) {
     const raw = (high - low) / count || 1;
@@ -96,8 +94,7 @@
   function chart(panel, one, base) {
     const width = Math.max(260, Math.min(640, panel.clientWidth / (panel.clientWidth > 850 ? 2 : 1)));
     const height = 160;
-    const svg = draw(panel, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img" });
-    svg.setAttribute("aria-label", `${one.label} over two revolutions`);
+    const svg = draw(panel, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${one.label} over two revolutions` });
     const all = base ? one.y.concat(base.y) : one.y;
     const big = Math.max(...all.map(Math.abs));
     const kilo = big >= 2000;
@@ -174,8 +171,8 @@
     const panel = byId("front-panel");
     /* as wide as there is room for, so that type keeps its size on a phone */
     const width = Math.max(300, Math.min(640, place.clientWidth)), height = Math.max(320, 0.72 * width);
-    const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group" });
-    svg.setAttribute("aria-label", "Pareto front: arrow keys move between designs, Enter shows one");
+    const label = "Pareto front: arrow keys move between designs, Enter shows one";
+    const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": label });
     const box = { left: 52, top: 34, width: width - 66, height: height - 84 };
     const reach = (axis, key) => points.flatMap((p) => [p[key], ...((p.intervals && p.intervals[along[axis]]) || [])]);
     const xs = extent(reach(0, "x"), 0.05), ys = extent(reach(1, "y"), 0.05);
@@ -184,10 +181,8 @@
     for (const [k, p] of points.entries()) {
       bars(svg, p, x, y);
       const mark = marker(svg, p, x(p.x), y(p.y));
-      mark.setAttribute("tabindex", "-1");
-      mark.setAttribute("role", "button");
-      mark.setAttribute("aria-label", `${p.case} ${p.name}: ${content.front.x} ${p.x}, ${content.front.y} ${p.y}`);
-      mark.setAttribute("data-index", k);
+      const words = `${p.case} ${p.name}: ${content.front.x} ${p.x}, ${content.front.y} ${p.y}`;
+      set(mark, { tabindex: "-1", role: "button", "aria-label": words, "data-index": k });
       marks[k] = mark;
       mark.addEventListener("mouseenter", () => describe(panel, p));
       mark.addEventListener("mouseleave", () => detail(panel, points[chosen]));
@@ -207,8 +202,7 @@
       marks[chosen].removeAttribute("aria-pressed");
       chosen = k;
       marks[k].classList.add("selected");
-      halo.setAttribute("cx", x(points[k].x));
-      halo.setAttribute("cy", y(points[k].y));
+      set(halo, { cx: x(points[k].x), cy: y(points[k].y) });
       marks[k].setAttribute("aria-pressed", "true");
       move(k, false);
       detail(panel, points[k]);
@@ -253,13 +247,9 @@
     const select = byId("motion-name"), button = byId("motion-play"), gain = byId("motion-gain");
     const at = byId("motion-at"), out = byId("motion-text"), speed = byId("motion-speed");
     for (const name of names) put(select, "option", called(name), { value: name });
-    const svg = draw(place, "svg", { role: "img" });
-    svg.setAttribute("aria-label", "The mechanism, its clearances drawn larger than they are");
+    const svg = draw(place, "svg", { role: "img", "aria-label": "The mechanism, its clearances drawn larger than they are" });
     let shapes = {}, motion = null, frame = 0, playing = false, last = 0, strongest = 1, l = 1;
-    const set = (name, attributes) => {
-      for (const [key, value] of Object.entries(attributes)) shapes[name].setAttribute(key, value);
-    };
-    const add = (name, kind, attributes) => { shapes[name] = draw(svg, kind); set(name, attributes); };
+    const add = (name, kind, attributes) => { shapes[name] = draw(svg, kind, attributes); };
 
     function load(name) {
       motion = content.motions[name];
@@ -302,15 +292,15 @@
       }));
       motion.bodies.forEach((points, b) => {
         const corners = points.map((p) => moved.get(p) || place(p));
-        if (points.length === 1) set(`body${b}`, { transform: `translate(${corners[0].join(" ")}) rotate(${(-180 * motion.angles[frame][b]) / Math.PI})` });
-        else set(`body${b}`, { points: corners.map((c) => c.join(",")).join(" ") });
+        if (points.length === 1) set(shapes[`body${b}`], { transform: `translate(${corners[0].join(" ")}) rotate(${(-180 * motion.angles[frame][b]) / Math.PI})` });
+        else set(shapes[`body${b}`], { points: corners.map((c) => c.join(",")).join(" ") });
       });
       motion.pairs.forEach(([journal, bearing], j) => {
         const size = (0.6 * l * motion.force[frame][j]) / strongest, length = Math.hypot(e[2 * j], e[2 * j + 1]) || 1;
         const [x, y] = place(journal), [cx, cy] = moved.get(bearing);
-        set(`ring${j}`, { cx, cy, r: Math.max(g * motion.clearance[j], 0.03 * l) });
-        set(`pin${j}`, { cx: x, cy: y });
-        set(`force${j}`, {
+        set(shapes[`ring${j}`], { cx, cy, r: Math.max(g * motion.clearance[j], 0.03 * l) });
+        set(shapes[`pin${j}`], { cx: x, cy: y });
+        set(shapes[`force${j}`], {
           x1: x, y1: y, x2: x + (size * e[2 * j]) / length, y2: y - (size * e[2 * j + 1]) / length,
           visibility: size > 0 ? "visible" : "hidden",
         });
