@@ -76,6 +76,8 @@ def write_report(
 def _page(content: Content, troubles: list[str]) -> str:
     """The whole document."""
     troubles += content.troubles
+    # as text, also where it is none in this system's encoding
+    place = content.directory.resolve().name.encode("utf-8", "replace").decode()
 
     def drawn_by_script() -> dict[str, Any]:
         made = picture.picture(content)
@@ -84,7 +86,7 @@ def _page(content: Content, troubles: list[str]) -> str:
 
     shown = attempt("What the page's script draws", drawn_by_script, troubles)
     opened = attempt("The first screen", partial(screen_of, content), troubles)
-    first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
+    first = opened or Screen(f"Results in {place}")
     wide = {*first.figures} & {*gallery.WIDE}
     drawn = gallery.figures(content, troubles, wide=wide)
     still = next((one for one in drawn if one["name"] == gallery.MECHANISM), None)
@@ -94,7 +96,7 @@ def _page(content: Content, troubles: list[str]) -> str:
     subjects = _subjects(content, folded, beside, troubles)
     return render(
         "page.html",
-        title=first.title or f"Report on {_readable(content.directory.resolve().name)}",
+        title=first.title or f"Report on {place}",
         sheet=sheet_of(content, first),
         policy=_policy(),
         style=asset("page.css"),
@@ -112,11 +114,6 @@ def _page(content: Content, troubles: list[str]) -> str:
         wide=wide,
         subjects=subjects,
     )
-
-
-def _readable(name: str) -> str:
-    """A file name as text, also one that is no text in this system's encoding."""
-    return name.encode("utf-8", "replace").decode()
 
 
 def _policy() -> str:
