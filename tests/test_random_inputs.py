@@ -1,5 +1,6 @@
 """Distributions of random inputs and how they vary together, against closed forms."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from scipy.special import gamma
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.session import design
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.surrogate.kernels import MATERN, SQUARED_EXPONENTIAL, Kernel
@@ -254,6 +256,21 @@ def test_every_method_correlates(method: str) -> None:
     points = design(scene, None)
     assert _correlation(points.column("m2"), points.column("m3")) == pytest.approx(0.786, abs=0.03)
     assert abs(_correlation(points.column("m2"), points.column("u2"))) < 0.06
+
+
+@pytest.mark.parametrize("measure", ["normal", "rank"])
+def test_a_matrix_that_is_not_definite_is_after_its_remedy(measure: str, shift: int) -> None:
+    rng, refused = np.random.default_rng(shift), 0
+    for count in rng.integers(2, 6, 50):
+        own = np.round(np.tril(rng.uniform(-0.99, 0.99, (count, count)), -1), 2)
+        own, rest = own + own.T, {"inputs": tuple("abcdef"[:count]), "measure": measure}
+        try:
+            Correlation(matrix=(own + np.eye(count)).tolist(), **rest)
+        except ValueError as error:
+            refused += 1
+            share = float(re.search(r"diagonal by ([\d.]+)", str(error))[1])
+            Correlation(matrix=(share * own + np.eye(count)).tolist(), **rest)
+    assert refused > 10
 
 
 # --- moments of surrogates -----------------------------------------------------------------------

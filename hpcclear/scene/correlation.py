@@ -42,21 +42,30 @@ class Correlation(Table):
         if (entries != entries.T).any() or (entries.diagonal() != 1.0).any():
             reason = "a correlation matrix is symmetric, with ones along its diagonal"
             raise invalid(reason, "Correct the entries that differ", "matrix")
-        least = float(np.linalg.eigvalsh(self.normal(self.inputs)).min())
+        for row, column in np.argwhere(abs(np.triu(entries, 1)) == 1.0):
+            pair, entry = f"{self.inputs[row]} and {self.inputs[column]}", entries[row, column]
+            reason = f"{pair} are correlated by {entry:g}: one of them determines the other"
+            one = ", or, if both are always equal, one random input with the paths of both"
+            raise invalid(reason, f"Write {0.99 * entry:g}{one if entry > 0 else ''}", "matrix")
+        least = self._least(entries)
         if least < LEAST_EIGENVALUE:
             reason = f"the matrix is not positive definite: its lowest eigenvalue is {least:.2g}"
-            remedy = f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say"
-            raise invalid(reason, remedy, "matrix")
+            shares = (k / 100 for k in range(99, 0, -1))
+            share = next(one for one in shares if self._least(one * entries) > LEAST_EIGENVALUE)
+            raise invalid(reason, f"Multiply all entries off the diagonal by {share:g}", "matrix")
+
+    def _least(self, entries: Array) -> float:
+        """Lowest eigenvalue of the correlations of normals by some entries off the diagonal."""
+        return float(np.linalg.eigvalsh(self._of_normals(entries)).min())
 
     def normal(self, names: Sequence[str]) -> Array:
         """Correlations of the normals behind some of its inputs, shape (n, n)."""
         rows = [self.inputs.index(name) for name in names]
-        entries = np.array(self.matrix)[np.ix_(rows, rows)]
-        if self.measure == "normal":
-            return entries
-        found = 2.0 * np.sin(np.pi / 6.0 * entries)
-        np.fill_diagonal(found, 1.0)
-        return found
+        return self._of_normals(np.array(self.matrix)[np.ix_(rows, rows)])
+
+    def _of_normals(self, entries: Array) -> Array:
+        found = entries if self.measure == "normal" else 2.0 * np.sin(np.pi / 6.0 * entries)
+        return found - np.diag(found.diagonal() - 1.0)
 
     def groups(self, names: Sequence[str]) -> list[int]:
         """Return the number of the group of each of some inputs, from 1 on in their order; 0 of independent ones.
