@@ -1,5 +1,6 @@
 """`init`: the first scene: a starter, all examples, or a linkage from a table of points or a drawing."""
 
+import shutil
 from pathlib import Path
 
 import click
@@ -93,10 +94,13 @@ def _copy_jobs(place: Path) -> None:
     with resources.as_file(resources.files("hpcclear.cli").joinpath("jobs")) as source:
         kinds = ("*.toml", "linkages/*.toml", "machines/*.toml", "*.slurm", "until_done.sh")
         found = sorted(path for kind in kinds for path in source.glob(kind))
-        for path in found:
-            target = place / path.relative_to(source)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            files.write_bytes(target, path.read_bytes())
+        try:
+            for path in found:
+                target = cli.place_of(place / path.relative_to(source))
+                files.write_bytes(target, path.read_bytes())
+        except BaseException:  # a part of them would stand in the way of the next attempt
+            shutil.rmtree(place, ignore_errors=True)
+            raise
     cli.show(f"written  {len(found)} files in {place}")
     cli.show(f"next     hpcclear check {place / 'quickstart.toml'}")
 
