@@ -175,11 +175,13 @@ def places(folder: Path) -> dict[str, Path]:
     (folder / "file").write_text("")
     (folder / "directory").mkdir()
     (folder / "loop").symlink_to(folder / "loop")
+    (folder / "link").symlink_to(folder / "nowhere")
     return {
         "missing directory": folder / "no" / "x.nc",
         "file as directory": folder / "file" / "x.nc",
         "directory in the way": folder / "directory",
         "loop": folder / "loop" / "x.nc",
+        "link to nowhere": folder / "link",
         "long name": folder / ("x" * 300),
         "proc": Path("/proc/x.nc"),
     }
@@ -188,7 +190,7 @@ def places(folder: Path) -> dict[str, Path]:
 PLACES = ["missing directory", "file as directory", "directory in the way", "loop", "proc"]
 
 
-@pytest.mark.parametrize("case", [*PLACES, "long name"])
+@pytest.mark.parametrize("case", [*PLACES, "link to nowhere", "long name"])
 def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
     place = places(tmp_path)[case]
     before = sorted(tmp_path.iterdir())

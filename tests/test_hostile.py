@@ -40,10 +40,10 @@ def refused(answer: tuple[int, str]) -> bool:
 # -- places -------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def thesis(tmp_path) -> Path:
+@pytest.fixture(params=[b"three years of work", b"", b"\x89HDF\r\n", b"%PDF-1.7"])
+def thesis(tmp_path, request) -> Path:
     path = tmp_path / "thesis.nc"
-    path.write_bytes(b"three years of work" * 1000)
+    path.write_bytes(request.param * 1000)
     return path
 
 
@@ -56,7 +56,8 @@ def test_results_never_replace_what_this_program_did_not_write(thesis, words):
         assert code == 0, output
     else:
         assert refused((code, output)), output
-        assert "was not written by hpcclear" in output
+        kind = {b"t": "text", b"": "empty", b"\x89": "NetCDF", b"%": "PDF"}[before[:1]]
+        assert f"the existing {kind} file was not written by hpcclear" in " ".join(output.split())
 
 
 def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):
@@ -137,6 +138,13 @@ def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
     code, output = limited(resource.RLIMIT_AS, megabytes * 2**20, words)
     assert "Traceback" not in output, output
     assert code == 0 or (code == 1 and "memory" in output), output
+
+
+@pytest.mark.parametrize("kilobytes", [1, 2, 3])
+def test_examples_that_do_not_fit_on_the_disk_leave_nothing_behind(tmp_path, kilobytes):
+    words = ["init", str(tmp_path / "jobs"), "--jobs"]
+    code, output = limited(resource.RLIMIT_FSIZE, kilobytes * 2**10, words)
+    assert (code, list(tmp_path.iterdir())) == (1, []), output
 
 
 @pytest.mark.nightly
