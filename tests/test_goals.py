@@ -103,6 +103,8 @@ def test_words_tables_and_units_of_the_objective() -> None:
         ({"objectives": ["mean", {"formula": "(1e9*m2)**9**2"}]}, "objectives.1.formula", "a power that"),
         ({"objectives": ["mean", {"statistic": "mean", "formula": "m2"}]}, "objectives.1", "either"),
         ({"constraints": [MASS]}, "constraints.0.most", "missing"),
+        ({"constraints": [{"statistic": "mean", "of": "peak-contact-pressure", "most": 1}]}, "constraints.0.of", "pressure"),
+        ({"objectives": ["mean", {"statistic": "mean", "of": "contact-half-angle"}]}, "objectives.1.of", "geometry"),
     ],
 )  # fmt: skip
 def test_goals_that_make_no_sense_are_refused(entries: dict[str, object], key: str, reason: str) -> None:  # fmt: skip

@@ -148,7 +148,7 @@ class ConsistentTables(SceneTables):
             raise invalid(reason, "Write study.objective instead", "numerics.objective")
         if chosen and not self.objective.of_joints:
             known = "mean-gap, mean-contact-force or peak-contact-force"
-            reason = f'study.objective = "{self.objective.name}" is of no joint'
+            reason = f'{self.objective_key} = "{self.objective.name}" is of no joint'
             raise invalid(reason, f"Leave the joints out, or choose {known}", key)
 
     def _check_target(self) -> None:
@@ -157,22 +157,22 @@ class ConsistentTables(SceneTables):
         why = "the confidence interval of a steady mean exists for the mean gap of all joints only"
         if self.numerics.objective_joints:
             raise invalid(why, "Leave out the joints, or target_error", "numerics.objective_joints")
-        named = self.numerics.objective if self.study is None else self.study.objective
-        if named not in (None, MEAN_GAP.name):
+        if (named := self.objective.name) != MEAN_GAP.name:
             remedy = "Remove numerics.target_error, and raise numerics.averaged_revolutions"
             raise invalid(f"{why}, and the objective is {named}", remedy, "numerics.target_error")
 
     def _check_pressures(self) -> None:
-        for one in () if self.effects.has_pressure else self._objectives():
+        for key, one in () if self.effects.has_pressure else self._objectives().items():
             if not one.asks.isdisjoint(WIDEST):
                 reason = f"{one.name} needs a geometry of contact with a pressure"
                 remedy = 'Add geometry = "line" or "liner" to effects.contact'
-                raise invalid(reason, remedy, self.objective_key, one.name)
+                raise invalid(reason, remedy, key, one.name)
 
     def _check_levels(self) -> None:
-        bands = self.bands()
-        key = "numerics.levels" if self.numerics.levels else self.objective_key
-        if (bands or self._asks_any(IMPACTS)) and not self.clearance_joints():
+        bands, every = self.bands(), self._objectives().items()
+        asking = [key for key, one in every if one.band or not one.asks.isdisjoint(IMPACTS)]
+        key = "numerics.levels" if self.numerics.levels else (*asking, self.objective_key)[0]
+        if (bands or asking) and not self.clearance_joints():
             reason = "force levels and impacts are those of joints with clearance"
             raise invalid(reason, 'Remove it, or set a joint\'s kind = "clearance"', key)
         if bands and self.numerics.target_error is not None:

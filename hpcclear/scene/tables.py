@@ -108,16 +108,20 @@ class SceneTables(Table):
     def bands(self) -> tuple[float, ...]:
         """Middles of the third-octave bands whose levels each sample records, Hz: requested, or required by the study."""
         asked = {band_of(one) for one in self.numerics.levels}
-        return tuple(sorted(asked | {one.band for one in self._objectives()} - {0.0}))
+        return tuple(sorted(asked | {one.band for one in self._objectives().values()} - {0.0}))
 
     def _asks_any(self, fields: Iterable[str]) -> bool:
         """Whether an objective or response of the study needs one of some fields of a record."""
-        return any(not one.asks.isdisjoint(fields) for one in self._objectives())
+        return any(not one.asks.isdisjoint(fields) for one in self._objectives().values())
 
-    def _objectives(self) -> list[Objective]:
-        """The objective, and the further responses of the study."""
-        further = () if self.study is None else self.study.further
-        return [self.objective, *map(self.objective_named, further)]
+    def _objectives(self) -> dict[str, Objective]:
+        """The objective, and the further responses of the study, by the entries that name them."""
+        named = {self.objective_key: self.objective}
+        for case in () if self.study is None else self.study.cases:
+            goals = {place: goal.of for place, goal in case.rows.items() if goal.of is not None}
+            key = f"study.cases.{case.name}"
+            named |= {f"{key}.{at}.of": self.objective_named(of) for at, of in goals.items()}
+        return named
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""
