@@ -5,6 +5,7 @@ import copy
 import functools
 import math
 import pickle
+import re
 import subprocess
 import sys
 import tomllib
@@ -51,7 +52,8 @@ def test_broken_scene_is_refused_with_key_and_remedy(path: Path) -> None:
 def test_what_nothing_of_a_study_reads_is_said() -> None:
     words = "verification.samples=10", "verification.contest=3", "accuracy.exceedance=0.1"
     words = *(f"study.{one}" for one in words), "numerics.target_revolutions=500"
-    said = " ".join(unused(load_scene(ROBUST, words)))
+    said = " ".join(unused(load_scene(ROBUST, [*words, "study.cases={mean = ['C']}"])))
+    assert re.findall(r"study\.random\.(\w+) is in no case", said) == ["m2", "m3", "u2", "I2"]
     assert "numerics.target_revolutions is not used" in said
     assert "study.verification.contest is not used" in said
     assert "study.accuracy.exceedance is not used" in said

@@ -257,6 +257,10 @@ def unused(scene: SceneTables) -> Iterator[str]:
         for entry in entries.split() if own is not None and idle else ():
             if getattr(own, entry) != type(own).model_fields[entry].default:
                 yield f"study.{table}.{entry} is not used: {why}"
+    used = {name for case in study.cases for name in case.random}
+    for row in study.random if used and scene.wear is None else ():  # which draws them all
+        if row.name not in used:
+            yield f"study.random.{row.name} is in no case, so hpcclear run does not use it; add it to one of study.cases"
     if study.accuracy is not None and draws:
         yield "study.accuracy is not used: study.verification names how many draws a design gets"
     if study.groups or study.sensitivity.groups == ():
