@@ -64,6 +64,9 @@ def test_a_choice_that_means_nothing_is_refused(joints, objective, said):
     with pytest.raises(InputError, match=said) as caught:
         of(load_scene(ROCKER), *joints, objective=objective)
     assert caught.value.key == "numerics.objective_joints"
+    bare = {"study": None, "numerics.objective": objective, "numerics.objective_joints": joints}
+    with pytest.raises(InputError, match=said.replace("is of", 'numerics.objective = ".*" is of')):
+        load_scene(ROCKER).with_(bare)
 
 
 def test_limits_are_of_all_joints():
