@@ -90,8 +90,7 @@ def measure(
                 seconds[k] += time.process_time() - began
                 gaps[-1][k] = np.where((outcome.status == 0)[:, None], outcome.mean_gap, np.nan)
                 start[k] = outcome.end().rows
-        run = Run(np.stack(gaps), seconds, start)
-        yield run
+        yield Run(np.stack(gaps), seconds, start)
 
 
 def _lanes(scene: Scene, rtol: float) -> Lanes:

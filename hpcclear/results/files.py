@@ -19,11 +19,6 @@ TEMPORARY = re.compile(r"\.hpcclear-[0-9a-f]{16}\.tmp")
 
 _LOOK = 4096  # bytes at each end of a file in which the mark of its kind stands
 
-_KINDS = {
-    b"\x89HDF": "NetCDF file", b"CDF": "NetCDF file", b"%PDF": "PDF file", b"\x89PNG": "PNG file", b"PK": "ZIP or Excel file",
-}  # fmt: skip
-"""Kinds of files by how they begin."""
-
 _OPENS_DIRECTORIES = os.open in os.supports_dir_fd  # not on native Windows
 
 _ATTEMPTS = 5  # of writing a file whose temporary a run that starts takes for such a leftover
@@ -57,7 +52,7 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     if not ours:
         reason, remedy = "it is not a regular file", "Choose another name"
         if stat.S_ISREG(about.st_mode):
-            reason = f"the existing {_kind(path)} was not written by hpcclear, or it was cut off"
+            reason = "the existing file was not written by hpcclear, or it was cut off"
             if path.suffix.lower() == ".csv":  # known by its headings alone
                 reason = "the existing table has other headings than this one"
             remedy += ", or move that file away"
@@ -72,15 +67,6 @@ def _is_marked(path: Path, mark: bytes) -> bool:
         begin = file.read(_LOOK)
         file.seek(max(0, os.fstat(file.fileno()).st_size - _LOOK))
         return mark in begin or mark in file.read(_LOOK)
-
-
-def _kind(path: Path) -> str:
-    """What a regular file is, in words."""
-    with path.open("rb") as file:
-        begin = file.read(_LOOK)
-    kinds = (words for start, words in _KINDS.items() if begin.startswith(start))
-    plain = "file" if b"\0" in begin else "text file" if begin else "empty file"
-    return next(kinds, plain)
 
 
 def write_bytes(path: Path, content: Buffer, mark: bytes = b"") -> None:

@@ -81,8 +81,7 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
 
 def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. Failures are reported."""
-    folder = run.directory / "responses"
-    folder.mkdir(exist_ok=True)
+    (run.directory / "responses").mkdir(exist_ok=True)
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):

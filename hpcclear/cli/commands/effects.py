@@ -55,8 +55,7 @@ def run(
                 reason = "--output names this file too"
                 raise InputError("--scene", str(reduced), reason, "Choose another name")
         wanted = Wanted(tolerance, *certificate_extent(scene, samples), forces)
-        place = cli.place_of(output)
-        found = run_effects(scene, place, ranks, how.options(), wanted)
+        found = run_effects(scene, cli.place_of(output), ranks, how.options(), wanted)
         describe_run(found, "effects")
         if reduced is not None:
             from hpcclear.results import files

@@ -232,8 +232,7 @@ def with_copies(
     signs = np.where(np.arange(at.MAX_COORDINATES) % 2 == 0, 1.0, -1.0)
     pattern = np.concatenate([signs, -signs])  # of coordinates, then of velocities
     start.moving *= 1.0 + PERTURBATION * np.tile(sizes, len(labels))[:, None] * pattern
-    copies = (labels[:, None] + np.arange(count)).ravel()
-    return par, start, copies
+    return par, start, (labels[:, None] + np.arange(count)).ravel()
 
 
 def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Records:

@@ -122,8 +122,7 @@ def distinguished(content: Results) -> Iterator[str]:
         rows = [k, *(single[p] for p in parts)]
         change = content["change"].values[rows, 0]
         limit = np.sqrt((content["limit"].values[rows, 0] ** 2).sum())
-        more = change[0] - change[1:].sum()
-        if abs(more) > limit:
+        if abs(change[0] - change[1:].sum()) > limit:
             whole, parts_sum = (f"{100 * one:+.2g} %" for one in (change[0], change[1:].sum()))
             yield f"{label(named(content, k))} interact: together they change f by {whole}, not {parts_sum}."
 

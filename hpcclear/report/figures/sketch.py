@@ -107,8 +107,7 @@ def differences(response: Results, before: Results) -> dict[str, list[str]]:
 def changes(scene: Scene, before: Scene) -> dict[str, list[str]]:
     """Numbers of bodies and joints that differ between two scenes of one structure, in lines, by the names of these."""
     found: dict[str, list[str]] = {}
-    known = set(before.numeric_paths())
-    for path in known.intersection(scene.numeric_paths()):
+    for path in {*before.numeric_paths()}.intersection(scene.numeric_paths()):
         row = _ROW.fullmatch(scene.path_in_linkage(path))
         pair = labels.quantities((before.number(path), scene.number(path)), scene.unit(path))
         if row and pair[0] != pair[1]:

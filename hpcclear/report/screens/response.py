@@ -112,8 +112,7 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
 
 
 def _steps(response: Results) -> Iterator[str]:
-    flags = int(response["flags"])
-    if flags & Flag.BEYOND_HERTZ:
+    if int(response["flags"]) & Flag.BEYOND_HERTZ:
         yield "stiffer bearings or less load"
     if not np.isfinite(half_width(response)):
         yield "numerics.target_error, for a mean with a confidence interval"

@@ -166,8 +166,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     if few:
         return Limited(np.nan, np.full(len(values), np.nan), np.nan, np.nan)
     above = (known & (values > limit)).sum(axis=1)
-    total = int(counts.sum())
-    share = float(above.sum() / total)
+    share = float(above.sum() / counts.sum())
     shifts = _shifts(above - counts * share, counts)
     lower, upper = _interval_of_share(share, shifts, counts, confidence)
     return Limited(share, shifts, lower, upper)
