@@ -90,7 +90,8 @@ def measure(
                 seconds[k] += time.process_time() - began
                 gaps[-1][k] = np.where((outcome.status == 0)[:, None], outcome.mean_gap, np.nan)
                 start[k] = outcome.end().rows
-        yield Run(np.stack(gaps), seconds, start)
+        run = Run(np.stack(gaps), seconds, start)
+        yield run
 
 
 def _lanes(scene: Scene, rtol: float) -> Lanes:
