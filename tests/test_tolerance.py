@@ -8,7 +8,8 @@ import formula_study
 import numpy as np
 import opened
 import pytest
-from formula_study import contents, formula, on_ranks
+from commands import contents
+from formula_study import formula, on_ranks
 from refusals import refused
 
 from hpcclear.base.outcome import Status
